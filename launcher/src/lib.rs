@@ -1,0 +1,1 @@
+//! The photonstream command: starts and watches the processes, one subcommand a task.

@@ -1,0 +1,1 @@
+//! Published virtual surface lights into pictures on the CPU, and the path-traced reference.

@@ -1,0 +1,1 @@
+//! Scene files into meshes, materials, lights, camera and a ray-tracing structure.

@@ -1,0 +1,1 @@
+//! Pure light-transport maths: sampling, lights, kernels, cameras, tone maps; no state.
