@@ -1,1 +1,4 @@
-//! Scene files into meshes, materials, lights, camera and a ray-tracing structure.
+//! Turns scene files into meshes, materials, lights, a camera and a ray-tracing structure.
+#![forbid(unsafe_code)]
+
+pub mod bvh;
