@@ -1,0 +1,196 @@
+//! Gathers what a loaded scene is: baked geometry, materials, lights, camera, settings and the ray-tracing structure.
+
+use crate::{bvh::SceneBvh, features::Features, settings::{RenderSettings, StreamingSettings}};
+use glam::{DAffine3, DVec3, Vec3};
+use photonstream_shading::{Camera, Light, light::Bounds};
+use std::{ops::Range, sync::Arc};
+
+/// Index of an object in [`Scene::objects`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ObjectId(pub u32);
+
+/// Index of a material in [`Scene::materials`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MaterialId(pub u32);
+
+/// Index of a light in [`Scene::lights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LightId(pub u32);
+
+/// A loaded, validated scene. Immutable: a change makes a new one, which shares what it can.
+///
+/// Positions in f32 are metres relative to [`Scene::origin_m`], so that a scene far from its coordinates' origin has
+/// the same precision as one at it.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What the config calls it, else its file's stem.
+    pub name: String,
+    /// Hash of all that determines the scene: resolved text and the content of its assets. Equal on every machine.
+    pub hash: u64,
+    /// The config with every default filled in and asset paths made absolute: a process that parses it gets this scene.
+    pub resolved_text: Arc<str>,
+    /// Where the scene's own origin lies in the coordinates of its config.
+    pub origin_m: DVec3,
+    /// Surfaces' reflectances, ordered by name.
+    pub materials: Vec<Material>,
+    /// Everything that can be hit, ordered by name.
+    pub objects: Vec<Object>,
+    /// Light sources, ordered by name.
+    pub lights: Vec<SceneLight>,
+    /// From where pictures are taken.
+    pub camera: Camera,
+    /// Settings of the simulation.
+    pub streaming: StreamingSettings,
+    /// Default settings of the renderers.
+    pub render: RenderSettings,
+    /// All triangles, in world space.
+    pub geometry: Arc<Geometry>,
+    /// Answers closest-hit and occlusion queries over `geometry`.
+    pub bvh: SceneBvh,
+    /// The sphere around all geometry.
+    pub bounds: Bounds,
+    /// What the scene contains, hence what has to be modelled.
+    pub features: Features,
+    /// What was repaired or left out while loading, one sentence each.
+    pub notices: Vec<String>,
+}
+
+/// The diffuse reflectance of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name in the config.
+    pub name: String,
+    /// Share of the arriving light that leaves again, linear RGB in [0, 1].
+    pub albedo: Vec3,
+}
+
+/// Which faces of an object's triangles reflect light. The others absorb it, and look black.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Sides {
+    /// The side the normal points to: the outside of a closed body.
+    #[default]
+    Front,
+    /// The other side: the inside of a closed body.
+    Back,
+    /// Both, each with light of its own.
+    Both,
+}
+
+/// One side of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// The side its normal points to.
+    Front = 0,
+    /// The other side.
+    Back = 1,
+}
+
+impl Sides {
+    /// Whether `side` reflects light.
+    #[inline]
+    pub fn contains(self, side: Side) -> bool {
+        matches!((self, side), (Self::Both, _) | (Self::Front, Side::Front) | (Self::Back, Side::Back))
+    }
+
+    /// The reflecting sides.
+    pub fn iter(self) -> impl Iterator<Item = Side> {
+        [Side::Front, Side::Back].into_iter().filter(move |&side| self.contains(side))
+    }
+}
+
+impl Side {
+    /// +1 for the front, -1 for the back: times the geometric normal, the normal of this side.
+    #[inline]
+    pub fn sign(self) -> f32 {
+        match self {
+            Self::Front => 1.0,
+            Self::Back => -1.0,
+        }
+    }
+}
+
+/// Something that can be hit, moved as a whole, and owns virtual surface lights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Name in the config.
+    pub name: String,
+    /// Its reflectance.
+    pub material: MaterialId,
+    /// Which faces reflect.
+    pub sides: Sides,
+    /// Its triangles in [`Geometry::triangles`].
+    pub triangles: Range<u32>,
+    /// Rigid motion from rest space (the object at its final size, neither turned nor moved) to the scene's space.
+    pub world_from_rest: DAffine3,
+    /// The light whose radiance its front emits, for emitters; an imported emitter may be several lights of equal
+    /// radiance, of which this is the first.
+    pub emitter: Option<LightId>,
+}
+
+/// A light with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneLight {
+    /// Name in the config.
+    pub name: String,
+    /// Shape and power, in the scene's space.
+    pub light: Light,
+    /// The object that shows the emitter, for area lights.
+    pub object: Option<ObjectId>,
+}
+
+/// All triangles of a scene. Triangles without area are left out at load; mirrored objects have their winding turned,
+/// so that normals point outwards.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Geometry {
+    /// Vertices in the scene's space.
+    pub vertices: Vec<Vec3>,
+    /// The same vertices in the rest space of their object.
+    pub rest_vertices: Vec<Vec3>,
+    /// Vertex indices, counter-clockwise seen from the front; those of one object are contiguous.
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit geometric normal of the front of each triangle, in the scene's space.
+    pub normals: Vec<Vec3>,
+    /// The object of each triangle.
+    pub object_of: Vec<ObjectId>,
+}
+
+impl Geometry {
+    /// The vertices of triangle `id` in the scene's space.
+    #[inline]
+    pub fn triangle(&self, id: u32) -> [Vec3; 3] {
+        self.triangles[id as usize].map(|v| self.vertices[v as usize])
+    }
+
+    /// The vertices of triangle `id` in its object's rest space.
+    #[inline]
+    pub fn rest_triangle(&self, id: u32) -> [Vec3; 3] {
+        self.triangles[id as usize].map(|v| self.rest_vertices[v as usize])
+    }
+}
+
+impl Scene {
+    /// The object called `name`.
+    pub fn object(&self, name: &str) -> Option<ObjectId> {
+        self.objects.binary_search_by(|o| o.name.as_str().cmp(name)).ok().map(|i| ObjectId(i as u32))
+    }
+
+    /// The light called `name`.
+    pub fn light(&self, name: &str) -> Option<LightId> {
+        self.lights.binary_search_by(|l| l.name.as_str().cmp(name)).ok().map(|i| LightId(i as u32))
+    }
+
+    /// The reflectance of an object, linear RGB.
+    #[inline]
+    pub fn albedo(&self, object: ObjectId) -> Vec3 {
+        self.materials[self.objects[object.0 as usize].material.0 as usize].albedo
+    }
+
+    /// The radiance (W m⁻² sr⁻¹) that `side` of an object emits.
+    #[inline]
+    pub fn emitted_radiance(&self, object: ObjectId, side: Side) -> Vec3 {
+        match (self.objects[object.0 as usize].emitter, side) {
+            (Some(light), Side::Front) => self.lights[light.0 as usize].light.emitted_radiance(),
+            _ => Vec3::ZERO,
+        }
+    }
+}

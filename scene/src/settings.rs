@@ -1,0 +1,128 @@
+//! Gathers the validated settings of simulation and rendering, with their defaults.
+
+use photonstream_shading::{Kernel, tone::ToneMap};
+
+/// Which sample a slot of the path pool uses when it is traced again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Sampling {
+    /// Slot i always replays sample i: an unchanged scene gives unchanged light.
+    #[default]
+    Replay,
+    /// Each refill takes the next sample of the sequence, the oldest path first: paper A's stream.
+    Fresh,
+}
+
+/// Whether virtual surface lights are shadowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Visibility {
+    /// V = 1: paper A.
+    None,
+    /// A shadow ray to every virtual surface light.
+    #[default]
+    Rays,
+}
+
+/// Settings of the simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StreamingSettings {
+    /// Number of virtual surface lights in the scene.
+    pub vsls: u32,
+    /// Number of paths in the pool, over all lights; at most [`StreamingSettings::MAX_POOL_PATHS`].
+    pub pool_paths: u32,
+    /// Which sample a slot uses when it is traced again.
+    pub sampling: Sampling,
+    /// Seed of placement and streaming.
+    pub seed: u64,
+    /// Triangles are shrunk about their centroid by this factor before virtual surface lights are placed.
+    pub placement_scale: f32,
+    /// Time between published frames, in ms.
+    pub publish_period_ms: f32,
+    /// Tracer threads; `None`: one per core.
+    pub threads: Option<u32>,
+    /// Lights beyond this number share one column of flux.
+    pub light_columns: u32,
+}
+
+impl StreamingSettings {
+    /// Most paths a pool may hold: the flux sums of so many paths cannot overflow.
+    pub const MAX_POOL_PATHS: u32 = 1 << 23;
+}
+
+impl Default for StreamingSettings {
+    fn default() -> Self {
+        Self {
+            vsls: 1000,
+            pool_paths: 1 << 17,
+            sampling: Sampling::Replay,
+            seed: 1,
+            placement_scale: 0.9,
+            publish_period_ms: 10.0,
+            threads: None,
+            light_columns: 8,
+        }
+    }
+}
+
+/// Default settings of the renderers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Picture width in pixels.
+    pub width: u32,
+    /// Picture height in pixels.
+    pub height: u32,
+    /// How the flux of a virtual surface light falls off.
+    pub kernel: Kernel,
+    /// Whether virtual surface lights are shadowed.
+    pub visibility: Visibility,
+    /// A virtual surface light is skipped where it cannot add this radiance (W m⁻² sr⁻¹); 0: never.
+    pub epsilon: f32,
+    /// Shadow rays per pixel and area light.
+    pub light_samples: u32,
+    /// Exposure of tone-mapped pictures, in stops.
+    pub exposure_ev: f32,
+    /// Tone map of PNG pictures.
+    pub tone_map: ToneMap,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            width: 800,
+            height: 600,
+            kernel: Kernel::Disc,
+            visibility: Visibility::Rays,
+            epsilon: 1e-6,
+            light_samples: 16,
+            exposure_ev: 0.0,
+            tone_map: ToneMap::Aces,
+        }
+    }
+}
+
+macro_rules! named {
+    ($type:ident, $what:literal, $($variant:ident = $name:literal),+) => {
+        impl $type {
+            /// All values, in the order of their discriminants.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// The name used in configs and on the command line.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),+ }
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+
+            fn from_str(name: &str) -> Result<Self, String> {
+                Self::ALL.iter().copied().find(|v| v.name() == name).ok_or_else(|| {
+                    let names: Vec<_> = Self::ALL.iter().map(|v| v.name()).collect();
+                    format!("unknown {} \"{name}\"; expected one of: {}", $what, names.join(", "))
+                })
+            }
+        }
+    };
+}
+
+named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
+named!(Visibility, "visibility", None = "none", Rays = "rays");
