@@ -1,0 +1,78 @@
+//! Turns a node's eight child boxes and a ray into the children the ray may enter, with entry distances.
+
+use super::lanes::{F32x8, Lanes, Slab, U32x8, WIDTH};
+use super::ray_frame::RayFrame;
+
+/// Set in a child reference that is a leaf (the rest: packet or part number), clear in a node number.
+pub(super) const LEAF: u32 = 1 << 31;
+/// Reference of an unused child slot, and of the root of an empty tree.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Boxes and references of up to eight children: 256 bytes, four cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Coordinates by axis, then lower and upper; unused slots are inverted infinite boxes.
+    pub(super) bounds: [[F32x8; 2]; 3],
+    pub(super) children: U32x8,
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        bounds: [[F32x8([f32::INFINITY; WIDTH]), F32x8([f32::NEG_INFINITY; WIDTH])]; 3],
+        children: U32x8([NONE; WIDTH]),
+    };
+
+    pub(super) fn set(&mut self, slot: usize, reference: u32, lo: [f32; 3], hi: [f32; 3]) {
+        for k in 0..3 {
+            self.bounds[k][0].0[slot] = lo[k];
+            self.bounds[k][1].0[slot] = hi[k];
+        }
+        self.children.0[slot] = reference;
+    }
+}
+
+/// The ray's slab constants in registers.
+#[derive(Clone, Copy)]
+pub(super) struct SlabLanes<L: Lanes> {
+    near: [Slab<L::F>; 3],
+    far: [Slab<L::F>; 3],
+    /// Row of the near plane by axis: 0 lower, 1 upper.
+    near_row: [usize; 3],
+    zero: L::F,
+}
+
+impl<L: Lanes> SlabLanes<L> {
+    #[inline(always)]
+    pub(super) fn new(l: L, frame: &RayFrame) -> Self {
+        let [x, y, z] = frame.inverse;
+        let (near, far) = (&frame.near_origin, &frame.far_origin);
+        Self {
+            near: [slab(l, near[0], x), slab(l, near[1], y), slab(l, near[2], z)],
+            far: [slab(l, far[0], x), slab(l, far[1], y), slab(l, far[2], z)],
+            near_row: [usize::from(x < 0.0), usize::from(y < 0.0), usize::from(z < 0.0)],
+            zero: l.splat(0.0),
+        }
+    }
+
+    /// Children entered before `t_max` and their entry distances (≥ 0).
+    #[inline(always)]
+    pub(super) fn enter(&self, l: L, node: &Node, t_max: f32) -> (L::M, L::F) {
+        let [x, y, z] = &node.bounds;
+        let [i, j, k] = [self.near_row[0] & 1, self.near_row[1] & 1, self.near_row[2] & 1];
+        let near_x = l.slab(l.load(&x[i]), &self.near[0]);
+        let near_y = l.slab(l.load(&y[j]), &self.near[1]);
+        let near_z = l.slab(l.load(&z[k]), &self.near[2]);
+        let far_x = l.slab(l.load(&x[i ^ 1]), &self.far[0]);
+        let far_y = l.slab(l.load(&y[j ^ 1]), &self.far[1]);
+        let far_z = l.slab(l.load(&z[k ^ 1]), &self.far[2]);
+        let entry = l.max(l.max(near_x, near_y), l.max(near_z, self.zero));
+        let exit = l.min(l.min(far_x, far_y), l.min(far_z, l.splat(t_max)));
+        (l.le(entry, exit), entry)
+    }
+}
+
+#[inline(always)]
+fn slab<L: Lanes>(l: L, origin: f32, inverse: f32) -> Slab<L::F> {
+    Slab { inverse: l.splat(inverse), origin: l.splat(origin), offset: l.splat(origin * inverse) }
+}

@@ -1,0 +1,109 @@
+//! Turns a ray into the constants that box and triangle tests share, or into nothing where it cannot hit.
+
+use glam::Vec3;
+
+use super::Ray;
+
+/// Largest magnitude of a coordinate in metres (about 10¹²) for which no intermediate product overflows `f32`.
+pub const MAX_COORDINATE: f32 = 1_099_511_627_776.0;
+
+/// Unit round-off of `f32`, 2⁻²⁴.
+const ROUND_OFF: f32 = f32::EPSILON * 0.5;
+
+/// Padding of a triangle's own box, as a multiple of the largest distance of its vertices from the origin.
+///
+/// The sheared vertices are off by ≤ 6.01 round-offs of that distance, so the exact ray meets a triangle whose
+/// vertices moved by no more; subtracting the origin, the reciprocal and the product add ≤ 4; 16 leaves a reserve.
+pub(super) const TRIANGLE_PAD: f32 = 16.0 * ROUND_OFF;
+
+/// Padding of node boxes as a multiple of the distance from the origin to the farthest corner of the scene:
+/// a triangle's own padding, 4 round-offs between exact and computed own box, and 2 of the node test itself.
+const NODE_PAD_DISTANCE: f32 = 24.0 * ROUND_OFF;
+/// Padding of node boxes as a multiple of the origin's largest coordinate: rounding `origin` and `origin · inverse`.
+const NODE_PAD_ORIGIN: f32 = 4.0 * ROUND_OFF;
+
+/// Components of the direction below this part of the largest are taken for that size in box tests, so that
+/// reciprocals stay finite: within the scene such a ray moves sideways by < 2⁻³⁹ of its length, far below the padding.
+const SMALLEST_COMPONENT: f32 = 1.0 / MAX_COORDINATE;
+
+/// A ray whose direction is scaled by a power of two (exactly) to a largest component in [1, 2).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RayFrame {
+    pub(super) origin: [f32; 3],
+    /// Reciprocal of the scaled direction, finite and not zero.
+    pub(super) inverse: [f32; 3],
+    /// Origins for the near and the far planes of node boxes.
+    pub(super) near_origin: [f32; 3],
+    pub(super) far_origin: [f32; 3],
+    /// Axes: `axis[2]` is the direction's largest, `axis[0]` and `axis[1]` follow it cyclically.
+    pub(super) axis: [usize; 3],
+    /// Shear that takes the direction to `axis[2]`, and the reciprocal of its length there.
+    pub(super) shear: [f32; 2],
+    pub(super) inverse_z: f64,
+    /// End of the ray in units of the scaled direction.
+    pub(super) t_max: f32,
+    /// Scaled distance × this = the caller's distance.
+    pub(super) t_scale: f32,
+}
+
+impl RayFrame {
+    /// `None` if anything is not finite (`t_max` may be +∞), the direction is zero, `t_max` ≤ 0 or the origin is
+    /// beyond [`MAX_COORDINATE`].
+    #[inline(always)]
+    pub(super) fn new(ray: &Ray, lo: Vec3, hi: Vec3) -> Option<Self> {
+        let largest = ray.direction.abs().max_element();
+        let origin_largest = ray.origin.abs().max_element();
+        let sound = largest > 0.0
+            && ray.direction.is_finite()
+            && ray.origin.is_finite()
+            && origin_largest <= MAX_COORDINATE
+            && ray.t_max > 0.0;
+        if !sound {
+            return None;
+        }
+        // 2^-e and 2^e for largest in [2^e, 2^(e+1)); the ends of the exponent range stay within a factor of 2^22.
+        let exponent = (largest.to_bits() >> 23).clamp(1, 253);
+        let scale = f32::from_bits((254 - exponent) << 23);
+        let t_rescale = f32::from_bits(exponent << 23);
+
+        let direction = ray.direction * scale;
+        let distance = (lo - ray.origin).abs().max((hi - ray.origin).abs()).max_element();
+        let pad = distance * NODE_PAD_DISTANCE + origin_largest * NODE_PAD_ORIGIN;
+        let smallest = largest * scale * SMALLEST_COMPONENT;
+        let mut frame = Self {
+            origin: ray.origin.to_array(),
+            inverse: [0.0; 3],
+            near_origin: [0.0; 3],
+            far_origin: [0.0; 3],
+            axis: largest_axis(direction),
+            shear: [0.0; 2],
+            inverse_z: 0.0,
+            t_max: ray.t_max * t_rescale,
+            t_scale: scale,
+        };
+        let d = direction.to_array();
+        for k in 0..3 {
+            let component = d[k].abs().max(smallest).copysign(d[k]);
+            frame.inverse[k] = 1.0 / component;
+            let outwards = pad.copysign(component);
+            frame.near_origin[k] = frame.origin[k] + outwards;
+            frame.far_origin[k] = frame.origin[k] - outwards;
+        }
+        let [kx, ky, kz] = frame.axis;
+        frame.shear = [d[kx] / d[kz], d[ky] / d[kz]];
+        frame.inverse_z = 1.0 / f64::from(d[kz]);
+        Some(frame)
+    }
+}
+
+#[inline(always)]
+fn largest_axis(direction: Vec3) -> [usize; 3] {
+    let d = direction.abs();
+    if d.x >= d.y && d.x >= d.z {
+        [1, 2, 0]
+    } else if d.y >= d.z {
+        [2, 0, 1]
+    } else {
+        [0, 1, 2]
+    }
+}

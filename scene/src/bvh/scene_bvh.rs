@@ -1,0 +1,124 @@
+//! Turns the parts of a scene into one structure that answers closest-hit and occlusion queries.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+use obvhs::aabb::Aabb;
+
+use super::collapse::collapse;
+use super::dispatch::{Instructions, Query, detect};
+use super::node::{NONE, Node};
+use super::part::{Bvh, binary_tree};
+use super::ray_frame::RayFrame;
+use super::{Hit, Ray};
+
+/// Parts under a small top level; a clone shares the parts.
+#[derive(Clone, Debug)]
+pub struct SceneBvh {
+    pub(super) parts: Vec<Part>,
+    pub(super) top: Vec<Node>,
+    pub(super) root: u32,
+    pub(super) lo: Vec3,
+    pub(super) hi: Vec3,
+    pub(super) instructions: Instructions,
+}
+
+/// A part's triangles by number, and their structure.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub(super) range: Range<u32>,
+    pub(super) bvh: Arc<Bvh>,
+}
+
+impl SceneBvh {
+    /// Builds one structure per range of triangle numbers in `parts`: a still part, one for each moving object.
+    ///
+    /// `vertices` are in metres, in world space. Triangles that cannot be hit are left out and counted in
+    /// [`Self::ignored`]: corner numbers outside `vertices`, coordinates not finite or beyond
+    /// [`super::MAX_COORDINATE`], zero area; so are numbers in `parts` beyond `triangles`.
+    pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], parts: &[Range<u32>]) -> Self {
+        let parts = parts
+            .iter()
+            .map(|range| Part {
+                range: range.clone(),
+                bvh: Arc::new(Bvh::build(vertices, triangles, range.clone())),
+            })
+            .collect();
+        let mut scene = Self {
+            parts,
+            top: Vec::new(),
+            root: NONE,
+            lo: Vec3::ZERO,
+            hi: Vec3::ZERO,
+            instructions: detect(),
+        };
+        scene.build_top();
+        scene
+    }
+
+    /// Builds part number `part` anew after its vertices moved; the others are shared, not touched.
+    ///
+    /// A number that is not a part changes nothing.
+    pub fn rebuild_part(&mut self, part: usize, vertices: &[Vec3], triangles: &[[u32; 3]]) {
+        if let Some(part) = self.parts.get_mut(part) {
+            part.bvh = Arc::new(Bvh::build(vertices, triangles, part.range.clone()));
+            self.build_top();
+        }
+    }
+
+    fn build_top(&mut self) {
+        let filled: Vec<u32> =
+            (0..self.parts.len() as u32).filter(|&i| !self.parts[i as usize].bvh.is_empty()).collect();
+        let boxes: Vec<Aabb> = filled
+            .iter()
+            .map(|&i| &self.parts[i as usize].bvh)
+            .map(|bvh| Aabb::new(bvh.lo.into(), bvh.hi.into()))
+            .collect();
+        let wide = collapse(&binary_tree(&boxes), &boxes, 1, |leaf| filled[leaf[0] as usize]);
+        let bounds = boxes.iter().fold(Aabb::INVALID, |all, b| all.union(b));
+        (self.lo, self.hi) =
+            if boxes.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (bounds.min.into(), bounds.max.into()) };
+        (self.top, self.root) = (wide.nodes, wide.root);
+    }
+
+    /// The hit with the smallest distance, of several at that distance the one with the lowest triangle number.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let frame = RayFrame::new(ray, self.lo, self.hi)?;
+        let nearest = self.instructions.run(Query::<false> { scene: self, frame: &frame });
+        nearest.found.then(|| Hit {
+            t: nearest.t * frame.t_scale,
+            u: nearest.u,
+            v: nearest.v,
+            triangle: nearest.id,
+        })
+    }
+
+    /// Whether anything is hit at all; the same as `closest(ray).is_some()`, and faster.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        RayFrame::new(ray, self.lo, self.hi)
+            .is_some_and(|frame| self.instructions.run(Query::<true> { scene: self, frame: &frame }).found)
+    }
+
+    /// Lower and upper corner of all triangles that can be hit; twice the origin if there are none.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        (self.lo, self.hi)
+    }
+
+    /// Structures of the parts, in the order they were given.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = &Bvh> {
+        self.parts.iter().map(|part| &*part.bvh)
+    }
+
+    /// Number of triangles left out because no ray can hit them.
+    pub fn ignored(&self) -> usize {
+        self.parts().map(|bvh| bvh.ignored as usize).sum()
+    }
+
+    /// Instruction set in use: `"avx512"`, `"avx2"` or `"portable"`.
+    pub fn instruction_set(&self) -> &'static str {
+        self.instructions.name()
+    }
+}

@@ -1,0 +1,175 @@
+//! Turns a ray and triangles into hits: a filter on eight triangles at once, then one exact resolution.
+
+use glam::{DVec3, Vec3};
+
+use super::lanes::{F32x8, Lanes, U32x8, WIDTH};
+use super::ray_frame::{MAX_COORDINATE, RayFrame, TRIANGLE_PAD};
+
+/// Up to eight triangles; unused lanes are NaN and never hit.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Packet {
+    /// Coordinates by vertex and axis.
+    pub(super) vertices: [[F32x8; 3]; 3],
+    /// Triangle numbers, `u32::MAX` in unused lanes.
+    pub(super) ids: U32x8,
+}
+
+impl Packet {
+    pub(super) const EMPTY: Self =
+        Self { vertices: [[F32x8([f32::NAN; WIDTH]); 3]; 3], ids: U32x8([u32::MAX; WIDTH]) };
+
+    pub(super) fn set(&mut self, lane: usize, id: u32, triangle: &[Vec3; 3]) {
+        for (rows, vertex) in self.vertices.iter_mut().zip(triangle) {
+            for (row, coordinate) in rows.iter_mut().zip(vertex.to_array()) {
+                row.0[lane] = coordinate;
+            }
+        }
+        self.ids.0[lane] = id;
+    }
+
+    #[inline(always)]
+    pub(super) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        self.vertices.map(|rows| rows.map(|row| row.0[lane]))
+    }
+}
+
+/// Whether a triangle can be hit at all: finite, within [`MAX_COORDINATE`], area not zero.
+pub(super) fn is_solid(triangle: &[Vec3; 3]) -> bool {
+    let [a, b, c] = triangle.map(DVec3::from);
+    triangle.iter().all(|v| v.is_finite() && v.abs().max_element() <= MAX_COORDINATE)
+        && (b - a).cross(c - a) != DVec3::ZERO
+}
+
+/// The nearest hit so far; distances in units of the scaled direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    pub(super) t: f32,
+    pub(super) u: f32,
+    pub(super) v: f32,
+    pub(super) id: u32,
+    pub(super) found: bool,
+}
+
+impl Nearest {
+    #[inline(always)]
+    pub(super) fn none(t_max: f32) -> Self {
+        // Identifier 0 admits no tie, so that the end of the ray itself is excluded.
+        Self { t: t_max, u: 0.0, v: 0.0, id: 0, found: false }
+    }
+
+    #[inline(always)]
+    pub(super) fn offer(&mut self, id: u32, hit: [f32; 3]) {
+        let [t, u, v] = hit;
+        if t < self.t || (t == self.t && id < self.id) {
+            *self = Self { t, u, v, id, found: true };
+        }
+    }
+}
+
+/// The ray's shear in registers.
+#[derive(Clone, Copy)]
+pub(super) struct ShearLanes<L: Lanes> {
+    origin: [L::F; 3],
+    shear: [L::F; 2],
+    zero: L::F,
+}
+
+impl<L: Lanes> ShearLanes<L> {
+    #[inline(always)]
+    pub(super) fn new(l: L, frame: &RayFrame) -> Self {
+        let ([kx, ky, kz], o) = (frame.axis, &frame.origin);
+        Self {
+            origin: [l.splat(o[kx]), l.splat(o[ky]), l.splat(o[kz])],
+            shear: [l.splat(frame.shear[0]), l.splat(frame.shear[1])],
+            zero: l.splat(0.0),
+        }
+    }
+
+    /// A vertex of each lane, translated and sheared.
+    #[inline(always)]
+    fn sheared(&self, l: L, rows: &[F32x8; 3], axis: [usize; 3]) -> [L::F; 2] {
+        let z = l.sub(l.load(&rows[axis[2]]), self.origin[2]);
+        let x = l.sub(l.load(&rows[axis[0]]), self.origin[0]);
+        let y = l.sub(l.load(&rows[axis[1]]), self.origin[1]);
+        [l.sub(x, l.mul(self.shear[0], z)), l.sub(y, l.mul(self.shear[1], z))]
+    }
+
+    /// Lanes whose edge functions do not differ in sign: every hit, and those where rounding to zero hides the sign.
+    #[inline(always)]
+    fn candidates(&self, l: L, frame: &RayFrame, packet: &Packet) -> u32 {
+        let a = self.sheared(l, &packet.vertices[0], frame.axis);
+        let b = self.sheared(l, &packet.vertices[1], frame.axis);
+        let c = self.sheared(l, &packet.vertices[2], frame.axis);
+        let u = edge(l, c, b);
+        let v = edge(l, a, c);
+        let w = edge(l, b, a);
+        let smallest = l.min(l.min(u, v), w);
+        let largest = l.max(l.max(u, v), w);
+        l.bits(l.or(l.le(self.zero, smallest), l.le(largest, self.zero)))
+    }
+
+    /// Offers every hit among the packet's triangles to `nearest`.
+    #[inline(always)]
+    pub(super) fn intersect(&self, l: L, frame: &RayFrame, packet: &Packet, nearest: &mut Nearest) {
+        let mut candidates = self.candidates(l, frame, packet);
+        while candidates != 0 {
+            let lane = candidates.trailing_zeros() as usize % WIDTH;
+            candidates &= candidates - 1;
+            if let Some(hit) = resolve(frame, &packet.triangle(lane)) {
+                nearest.offer(packet.ids.0[lane], hit);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn edge<L: Lanes>(l: L, p: [L::F; 2], q: [L::F; 2]) -> L::F {
+    l.sub(l.mul(p[0], q[1]), l.mul(p[1], q[0]))
+}
+
+/// Scaled distance (positive) and barycentric u, v of one triangle: the only arithmetic that makes a hit.
+///
+/// Vertices are translated and sheared in `f32` exactly as in the filter; the edge functions are products of 24-bit
+/// numbers, exact in `f64`, so their signs are exact and agree between triangles that share an edge. The distance is
+/// clamped to the triangle's own padded box, which makes culling by any enclosing box exact (see the module's notes).
+#[inline(always)]
+pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32; 3]> {
+    let [kx, ky, kz] = frame.axis;
+    let [a, b, c] = triangle.map(|vertex| {
+        let z = vertex[kz] - frame.origin[kz];
+        let x = vertex[kx] - frame.origin[kx];
+        let y = vertex[ky] - frame.origin[ky];
+        let sheared = [x - frame.shear[0] * z, y - frame.shear[1] * z];
+        ([x, y, z], sheared.map(f64::from))
+    });
+    let edge = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+    let (u, v, w) = (edge(c.1, b.1), edge(a.1, c.1), edge(b.1, a.1));
+    let agree = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    let determinant = u + v + w;
+    if !agree || determinant == 0.0 {
+        return None;
+    }
+    let inverse = 1.0 / determinant;
+    let z = u * f64::from(a.0[2]) + v * f64::from(b.0[2]) + w * f64::from(c.0[2]);
+    let t = (z * inverse * frame.inverse_z) as f32;
+
+    let mut near = f32::NEG_INFINITY;
+    let mut far = f32::INFINITY;
+    let extent = |i: usize| {
+        let low = a.0[i].min(b.0[i]).min(c.0[i]);
+        let high = a.0[i].max(b.0[i]).max(c.0[i]);
+        (low, high)
+    };
+    let extents = [extent(0), extent(1), extent(2)];
+    let reach = extents.iter().fold(0.0f32, |reach, (low, high)| reach.max(-low).max(*high));
+    let pad = reach * TRIANGLE_PAD;
+    for (i, (low, high)) in extents.into_iter().enumerate() {
+        let inverse = frame.inverse[frame.axis[i]];
+        let (p, q) = ((low - pad) * inverse, (high + pad) * inverse);
+        near = near.max(p.min(q));
+        far = far.min(p.max(q));
+    }
+    let t = t.max(near).min(far);
+    (near <= far && t > 0.0).then(|| [t, (v * inverse) as f32, (w * inverse) as f32])
+}
