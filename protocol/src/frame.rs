@@ -1,0 +1,178 @@
+//! Turns verified words into an owned frame, double-buffered so that a reader always holds a whole one.
+
+use std::sync::Arc;
+
+use crate::chunks::{CHUNK_RECORDS, ChunkSet};
+use crate::error::ProtocolError;
+use crate::record::{ArrayKind, LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
+use crate::ring_read::{ArrayView, Head, Staging};
+use crate::shape::head;
+
+/// A complete, coherent frame in private memory.
+#[derive(Debug, Clone, Default)]
+pub struct VslFrame {
+    /// Number of the segment it came from.
+    pub epoch: u64,
+    /// Number of the frame.
+    pub frame: u64,
+    /// When it was published, monotonic ns.
+    pub publish_time_ns: u64,
+    /// Time of the simulated scene, in s.
+    pub simulation_time_s: f64,
+    /// Configuration it belongs to.
+    pub config_generation: u64,
+    /// Identifies the scene.
+    pub scene_hash: u64,
+    /// Virtual surface lights.
+    pub vsls: Vec<VslRecord>,
+    /// Objects.
+    pub objects: Vec<ObjectRecord>,
+    /// Lights.
+    pub lights: Vec<LightRecord>,
+    /// Counters.
+    pub statistics: StatisticsRecord,
+    /// The resolved scene; the same allocation for as long as the text stays the same.
+    pub scene_text: Arc<str>,
+}
+
+const ARRAYS: usize = ArrayKind::ALL.len();
+const VSL: usize = 0;
+const TEXT: usize = 4;
+
+#[derive(Default)]
+struct Buffer {
+    frame: VslFrame,
+    text: Vec<[u64; 8]>,
+    versions: [Vec<u64>; ARRAYS],
+}
+
+impl Buffer {
+    fn resize(&mut self, a: usize, records: usize) {
+        match a {
+            0 => self.frame.vsls.resize_with(records, VslRecord::default),
+            1 => self.frame.objects.resize_with(records, ObjectRecord::default),
+            2 => self.frame.lights.resize_with(records, LightRecord::default),
+            TEXT => self.text.resize(records, [0; 8]),
+            _ => {}
+        }
+        self.versions[a].resize(records.div_ceil(CHUNK_RECORDS), 0);
+    }
+
+    fn words(&self, a: usize) -> &[u64] {
+        match a {
+            0 => bytemuck::cast_slice(&self.frame.vsls),
+            1 => bytemuck::cast_slice(&self.frame.objects),
+            2 => bytemuck::cast_slice(&self.frame.lights),
+            3 => {
+                bytemuck::cast_slice(&std::slice::from_ref(&self.frame.statistics)[..self.versions[a].len()])
+            }
+            _ => self.text.as_flattened(),
+        }
+    }
+
+    fn words_mut(&mut self, a: usize) -> (&mut [u64], &mut [u64]) {
+        let versions = &mut self.versions[a];
+        let words = match a {
+            0 => bytemuck::cast_slice_mut(&mut self.frame.vsls),
+            1 => bytemuck::cast_slice_mut(&mut self.frame.objects),
+            2 => bytemuck::cast_slice_mut(&mut self.frame.lights),
+            3 => {
+                let records = versions.len();
+                bytemuck::cast_slice_mut(&mut std::slice::from_mut(&mut self.frame.statistics)[..records])
+            }
+            _ => self.text.as_flattened_mut(),
+        };
+        (words, versions)
+    }
+}
+
+/// The last complete frame, and the next one as far as it has been copied.
+#[derive(Default)]
+pub(crate) struct FramePair {
+    front: Buffer,
+    back: Buffer,
+    complete: bool,
+}
+
+impl Staging for FramePair {
+    fn array(&mut self, a: usize, records: usize) -> ArrayView<'_> {
+        self.back.resize(a, records);
+        let (words, versions) = self.back.words_mut(a);
+        ArrayView {
+            words,
+            versions,
+            front_words: self.front.words(a),
+            front_versions: &self.front.versions[a],
+        }
+    }
+}
+
+impl FramePair {
+    /// The last complete frame.
+    pub(crate) fn frame(&self) -> Option<&VslFrame> {
+        self.complete.then_some(&self.front.frame)
+    }
+
+    /// Forgets what is known about chunks, because another segment follows; the last complete frame stays.
+    pub(crate) fn forget_versions(&mut self) {
+        for versions in self.front.versions.iter_mut().chain(&mut self.back.versions) {
+            versions.fill(0);
+        }
+    }
+
+    /// Makes the staged frame the last complete one, and notes which chunks of lights changed.
+    pub(crate) fn finish(
+        &mut self,
+        words: &Head,
+        epoch: u64,
+        scene_hash: u64,
+        changed: &mut ChunkSet,
+    ) -> Result<(), ProtocolError> {
+        let text = self.scene_text(words[head::TEXT_BYTES])?;
+        let simulation_time_s = f64::from_bits(words[head::SIMULATION_TIME_S]);
+        if !simulation_time_s.is_finite() {
+            return Err(ProtocolError::corrupt("simulation time", simulation_time_s, "a finite number"));
+        }
+        let (front, back) = (&self.front, &mut self.back);
+        changed.reset(back.versions[VSL].len());
+        for (c, version) in back.versions[VSL].iter().enumerate() {
+            if front.versions[VSL].get(c) != Some(version) {
+                changed.insert(c);
+            }
+        }
+        let frame = &mut back.frame;
+        frame.scene_text = text;
+        frame.epoch = epoch;
+        frame.scene_hash = scene_hash;
+        frame.frame = words[head::FRAME];
+        frame.publish_time_ns = words[head::PUBLISH_TIME_NS];
+        frame.simulation_time_s = simulation_time_s;
+        frame.config_generation = words[head::CONFIG_GENERATION];
+        std::mem::swap(&mut self.front, &mut self.back);
+        self.complete = true;
+        Ok(())
+    }
+
+    /// The staged scene text: the last frame's own where no chunk of it changed.
+    fn scene_text(&self, bytes: u64) -> Result<Arc<str>, ProtocolError> {
+        let last = &self.front.frame.scene_text;
+        if self.complete
+            && bytes == last.len() as u64
+            && self.front.versions[TEXT] == self.back.versions[TEXT]
+        {
+            return Ok(Arc::clone(last));
+        }
+        let staged: &[u8] = bytemuck::cast_slice(self.back.text.as_flattened());
+        let staged = usize::try_from(bytes).ok().and_then(|bytes| staged.get(..bytes));
+        let staged = staged.ok_or_else(|| {
+            ProtocolError::corrupt(
+                "scene text length",
+                bytes,
+                format!("at most {}", self.back.text.len() * 64),
+            )
+        })?;
+        let text = std::str::from_utf8(staged)
+            .map_err(|error| ProtocolError::corrupt("scene text", error, "valid UTF-8"))?;
+        Ok(Arc::from(text))
+    }
+}
