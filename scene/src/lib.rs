@@ -1,4 +1,24 @@
 //! Turns scene files into meshes, materials, lights, a camera and a ray-tracing structure.
+//!
+//! [`SceneConfig`] is what a user wrote, [`Scene`] what is valid: [`SceneConfig::from_file`] parses,
+//! [`SceneConfig::build`] validates and bakes, [`Scene::load`] does both. `configs/README.md` lists every key.
 #![forbid(unsafe_code)]
 
+mod bake;
+mod build;
 pub mod bvh;
+pub mod config;
+mod error;
+pub mod features;
+mod import;
+mod placement;
+mod primitives;
+mod scene;
+mod settings;
+
+pub use config::SceneConfig;
+pub use error::{Place, SceneError};
+pub use features::Features;
+pub use import::AssetRoots;
+pub use scene::{Geometry, LightId, Material, MaterialId, Object, ObjectId, Scene, SceneLight, Side, Sides};
+pub use settings::{RenderSettings, Sampling, StreamingSettings, Visibility};

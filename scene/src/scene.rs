@@ -1,6 +1,10 @@
 //! Gathers what a loaded scene is: baked geometry, materials, lights, camera, settings and the ray-tracing structure.
 
-use crate::{bvh::SceneBvh, features::Features, settings::{RenderSettings, StreamingSettings}};
+use crate::{
+    bvh::SceneBvh,
+    features::Features,
+    settings::{RenderSettings, StreamingSettings},
+};
 use glam::{DAffine3, DVec3, Vec3};
 use photonstream_shading::{Camera, Light, light::Bounds};
 use std::{ops::Range, sync::Arc};

@@ -1,5 +1,6 @@
 //! Gathers the validated settings of simulation and rendering, with their defaults.
 
+use crate::scene::Sides;
 use photonstream_shading::{Kernel, tone::ToneMap};
 
 /// Which sample a slot of the path pool uses when it is traced again.
@@ -46,6 +47,9 @@ pub struct StreamingSettings {
 impl StreamingSettings {
     /// Most paths a pool may hold: the flux sums of so many paths cannot overflow.
     pub const MAX_POOL_PATHS: u32 = 1 << 23;
+
+    /// Most virtual surface lights a scene may have.
+    pub const MAX_VSLS: u32 = 4_000_000;
 }
 
 impl Default for StreamingSettings {
@@ -124,5 +128,6 @@ macro_rules! named {
     };
 }
 
+named!(Sides, "sides", Front = "front", Back = "back", Both = "both");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
 named!(Visibility, "visibility", None = "none", Rays = "rays");

@@ -1,0 +1,216 @@
+//! Turns `[light.NAME]` tables into lights, and area lights into objects that show them.
+
+use super::{Inputs, check_name, materials::Materials};
+use crate::{
+    bake::{Emitter, EmitterFace, Part, Strength},
+    config::{
+        DirectionalConfig, Field, LightConfig, OneOrThree, PointConfig, RectangleConfig, SpotConfig, Vector,
+    },
+    error::SceneError,
+    placement::Placement,
+    primitives::quad,
+    scene::Sides,
+};
+use glam::DVec3;
+use photonstream_shading::{Light, LightShape};
+use std::collections::BTreeMap;
+
+/// Smallest half angle of a spot: below, f32 directions in the cone are too few to tell apart.
+const MIN_HALF_ANGLE_DEG: f64 = 0.01;
+
+/// A light without a surface, in the config's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlainLight {
+    power: DVec3,
+    shape: PlainShape,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum PlainShape {
+    Point { position: DVec3 },
+    Spot { position: DVec3, direction: DVec3, inner_deg: f64, outer_deg: f64 },
+    Directional { direction: DVec3 },
+}
+
+impl PlainLight {
+    /// The light in the space of a scene around `origin`.
+    pub(super) fn around(self, origin: DVec3) -> Light {
+        let shape = match self.shape {
+            PlainShape::Point { position } => LightShape::Point { position: (position - origin).as_vec3() },
+            PlainShape::Spot { position, direction, inner_deg, outer_deg } => LightShape::Spot {
+                position: (position - origin).as_vec3(),
+                direction: direction.as_vec3().normalize(),
+                versine_inner: versine(inner_deg),
+                versine_outer: versine(outer_deg),
+            },
+            PlainShape::Directional { direction } => {
+                LightShape::Directional { direction: direction.as_vec3().normalize() }
+            }
+        };
+        Light { shape, power: self.power.as_vec3() }
+    }
+}
+
+/// 1 - cos of an angle, without the cancellation.
+fn versine(degrees: f64) -> f32 {
+    (2.0 * (degrees.to_radians() * 0.5).sin().powi(2)) as f32
+}
+
+pub(super) fn read<'a>(
+    table: &mut BTreeMap<String, LightConfig>,
+    field: &Field<'a>,
+    materials: &mut Materials,
+    inputs: &mut Inputs<'a>,
+) -> Result<(), SceneError> {
+    for (name, light) in table {
+        let field = field.key(name);
+        check_name(name, &field)?;
+        let LightConfig { power_w, irradiance_w_m2, spot, point, directional, rectangle } = light;
+        let shape = match (spot, point, directional, rectangle) {
+            (Some(spot), None, None, None) => read_spot(spot, &field.key("spot"))?,
+            (None, Some(point), None, None) => read_point(point, &field.key("point"))?,
+            (None, None, Some(directional), None) => {
+                read_directional(directional, &field.key("directional"))?
+            }
+            (None, None, None, Some(rectangle)) => {
+                let power = read_power(*power_w, *irradiance_w_m2, false, &field)?;
+                let part = read_rectangle(name, rectangle, power, &field, materials)?;
+                if inputs.parts.contains_key(name) {
+                    return Err(field.invalid(
+                        format!("the name \"{name}\" twice, for an object and for this rectangle"),
+                        "different names: the object that shows a rectangle is called like its light",
+                        "rename one of them",
+                    ));
+                }
+                inputs.parts.insert(name.clone(), part);
+                continue;
+            }
+            (spot, point, directional, rectangle) => {
+                let given = [
+                    ("spot", spot.is_some()),
+                    ("point", point.is_some()),
+                    ("directional", directional.is_some()),
+                    ("rectangle", rectangle.is_some()),
+                ];
+                return Err(not_one_shape(&field, &given));
+            }
+        };
+        let irradiance = matches!(shape, PlainShape::Directional { .. });
+        let power = read_power(*power_w, *irradiance_w_m2, irradiance, &field)?;
+        inputs.lights.insert(name.clone(), PlainLight { power, shape });
+    }
+    Ok(())
+}
+
+/// The error of a table that should have exactly one of some keys.
+pub(super) fn not_one_shape(field: &Field<'_>, keys: &[(&str, bool)]) -> SceneError {
+    let given: Vec<_> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
+    let all: Vec<_> = keys.iter().map(|(key, _)| *key).collect();
+    let found = if given.is_empty() { "none".to_owned() } else { given.join(" and ") };
+    let remedy =
+        if given.is_empty() { "add one" } else { "keep one and move the others to tables of their own" };
+    field.invalid(found, format!("exactly one of {}", all.join(", ")), remedy)
+}
+
+fn read_power(
+    power: Option<OneOrThree>,
+    irradiance: Option<OneOrThree>,
+    wants_irradiance: bool,
+    field: &Field<'_>,
+) -> Result<DVec3, SceneError> {
+    let (wanted, other, value, unwanted) = if wants_irradiance {
+        ("irradiance_w_m2", "power_w", irradiance, power)
+    } else {
+        ("power_w", "irradiance_w_m2", power, irradiance)
+    };
+    if unwanted.is_some() {
+        return Err(field.key(other).invalid(
+            other,
+            wanted,
+            "directional lights take irradiance_w_m2, all others power_w",
+        ));
+    }
+    let value = value.ok_or_else(|| field.missing(wanted))?;
+    field.key(wanted).power(value)
+}
+
+fn read_point(point: &PointConfig, field: &Field<'_>) -> Result<PlainShape, SceneError> {
+    Ok(PlainShape::Point { position: field.key("position_m").metres(point.position_m)? })
+}
+
+fn read_directional(directional: &DirectionalConfig, field: &Field<'_>) -> Result<PlainShape, SceneError> {
+    Ok(PlainShape::Directional { direction: field.key("direction").direction(directional.direction)? })
+}
+
+fn read_spot(spot: &mut SpotConfig, field: &Field<'_>) -> Result<PlainShape, SceneError> {
+    let position = field.key("position_m").metres(spot.position_m)?;
+    let direction = match (spot.target_m, spot.direction) {
+        (Some(target), None) => {
+            let field = field.key("target_m");
+            let axis = field.metres(target)? - position;
+            axis.try_normalize().ok_or_else(|| {
+                field.invalid("the light's own position", "a point apart from position_m", "move target_m")
+            })?
+        }
+        (None, Some(direction)) => field.key("direction").direction(direction)?,
+        (target, direction) => {
+            let given = [("target_m", target.is_some()), ("direction", direction.is_some())];
+            return Err(not_one_shape(field, &given));
+        }
+    };
+    let outer_deg = field.key("outer_half_angle_deg").number(
+        spot.outer_half_angle_deg,
+        "half an opening angle from 0.01 to 180 degrees",
+        |x| (MIN_HALF_ANGLE_DEG..=180.0).contains(&x),
+    )?;
+    let inner = *spot.inner_half_angle_deg.get_or_insert(0.9 * outer_deg);
+    let expected = format!("an angle from 0 to outer_half_angle_deg = {outer_deg}");
+    let inner_deg =
+        field.key("inner_half_angle_deg").number(inner, &expected, |x| (0.0..=outer_deg).contains(&x))?;
+    Ok(PlainShape::Spot { position, direction, inner_deg, outer_deg })
+}
+
+fn read_rectangle<'a>(
+    name: &str,
+    rectangle: &mut RectangleConfig,
+    power: DVec3,
+    field: &Field<'a>,
+    materials: &mut Materials,
+) -> Result<Part<'a>, SceneError> {
+    let field = field.key("rectangle");
+    let albedo = *rectangle.albedo.get_or_insert(OneOrThree([0.0; 3]));
+    let albedo = field.key("albedo").albedo(albedo)?;
+    let material = format!("{name}/emitter");
+    materials.add(material.clone(), albedo);
+    let mesh = read_quad([rectangle.corner_m, rectangle.edge_u_m, rectangle.edge_v_m], &field)?;
+    Ok(Part {
+        name: name.to_owned(),
+        field,
+        material,
+        sides: Sides::Front,
+        mesh,
+        placement: Placement::IDENTITY,
+        emitter: Some(Emitter {
+            strength: Strength::Power(power),
+            faces: vec![EmitterFace::Parallelogram([0, 1, 3])],
+        }),
+    })
+}
+
+/// The mesh of a quad given by corner and edges.
+pub(super) fn read_quad(
+    [corner, edge_u, edge_v]: [Vector; 3],
+    field: &Field<'_>,
+) -> Result<crate::primitives::Mesh, SceneError> {
+    let corner = field.key("corner_m").metres(corner)?;
+    let edge_u = field.key("edge_u_m").metres(edge_u)?;
+    let edge_v = field.key("edge_v_m").metres(edge_v)?;
+    if edge_u.cross(edge_v).length() == 0.0 {
+        return Err(field.key("edge_v_m").invalid(
+            "edges that are parallel or zero",
+            "two edges that span an area",
+            "change edge_u_m or edge_v_m",
+        ));
+    }
+    Ok(quad(corner, edge_u, edge_v))
+}

@@ -1,0 +1,192 @@
+//! Turns a [`SceneConfig`] into a [`Scene`]: validates every value, imports, bakes, names and hashes.
+
+mod camera;
+mod imported;
+mod lights;
+mod materials;
+mod objects;
+mod settings;
+
+use crate::{
+    bake::{self, Baked, Part, Strength},
+    bvh::SceneBvh,
+    config::{Document, Field, SceneConfig},
+    error::SceneError,
+    features::Features,
+    import::AssetRoots,
+    scene::{LightId, ObjectId, Scene, SceneLight},
+};
+use glam::DVec3;
+use materials::Materials;
+use photonstream_shading::{Light, LightShape};
+use std::{collections::BTreeMap, f64::consts::PI, path::Path, sync::Arc};
+
+impl Scene {
+    /// Loads a scene file.
+    ///
+    /// # Errors
+    /// If the file or an asset cannot be read, or anything in it is not valid.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        SceneConfig::from_file(path)?.build()
+    }
+
+    /// Loads [`Scene::resolved_text`]: gives the same scene bit for bit, as long as its assets stay as they are.
+    ///
+    /// # Errors
+    /// As for [`Scene::load`].
+    pub fn from_resolved(text: &str) -> Result<Self, SceneError> {
+        SceneConfig::from_text(text, Path::new("resolved scene"))?.build()
+    }
+}
+
+impl SceneConfig {
+    /// Validates the config, loads its assets and bakes its geometry.
+    ///
+    /// # Errors
+    /// If an asset cannot be read, or any value is not valid.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        let roots = AssetRoots::from_environment(&self.document.file);
+        self.build_with(&roots)
+    }
+
+    /// As [`SceneConfig::build`], with assets of relative path looked for in `roots`.
+    ///
+    /// # Errors
+    /// As for [`SceneConfig::build`].
+    pub fn build_with(mut self, roots: &AssetRoots) -> Result<Scene, SceneError> {
+        let document = std::mem::take(&mut self.document);
+        let root = Field::root(&document);
+        let name = self.name.get_or_insert_with(|| stem(&document)).clone();
+        let streaming = settings::streaming(&mut self.streaming, &root.key("streaming"))?;
+        let render = settings::render(&mut self.render, &root.key("render"))?;
+        let mut materials = Materials::read(&self.material, &root.key("material"))?;
+
+        let mut inputs =
+            Inputs { parts: BTreeMap::new(), lights: BTreeMap::new(), contents: BTreeMap::new() };
+        let mut notices = Vec::new();
+        objects::read(
+            &mut self.object,
+            &root.key("object"),
+            roots,
+            &mut materials,
+            &mut inputs,
+            &mut notices,
+        )?;
+        lights::read(&mut self.light, &root.key("light"), &mut materials, &mut inputs)?;
+        let parts: Vec<Part<'_>> = inputs.parts.into_values().collect();
+        if parts.is_empty() {
+            return Err(root.invalid("no object", "at least one", "add an [object.NAME] with a shape"));
+        }
+
+        let origin_m = match self.origin_m {
+            Some(origin) => root.key("origin_m").metres(origin)?,
+            None => bake::snapped_centre(bake::bounding_box(&parts)),
+        };
+        self.origin_m = Some(origin_m.into());
+        let camera = camera::camera(&mut self.camera, &root.key("camera"), origin_m)?;
+        let materials = materials.into_list();
+        let baked = bake::bake(parts, origin_m, &materials)?;
+        notices.extend(baked.notices.iter().cloned());
+        let (baked, lights) = join_lights(baked, inputs.lights, origin_m);
+        let Baked { geometry, objects, bounds, .. } = baked;
+
+        let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
+        let bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
+        let features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
+        let (resolved_text, hash) = resolve(&mut self, &inputs.contents);
+        Ok(Scene {
+            name,
+            hash,
+            resolved_text,
+            origin_m,
+            materials,
+            objects,
+            lights,
+            camera,
+            streaming,
+            render,
+            geometry: Arc::new(geometry),
+            bvh,
+            bounds,
+            features,
+            notices,
+        })
+    }
+}
+
+/// What the tables of a config contribute to a scene, by name.
+struct Inputs<'a> {
+    parts: BTreeMap<String, Part<'a>>,
+    /// Lights without a surface, in the config's coordinates.
+    lights: BTreeMap<String, lights::PlainLight>,
+    /// Absolute path and hash of the asset of each importing object.
+    contents: BTreeMap<String, (String, blake3::Hash)>,
+}
+
+fn stem(document: &Document) -> String {
+    document.file.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Brings all lights into one list, ordered by name, and links emitters with the objects that show them.
+fn join_lights(
+    mut baked: Baked,
+    plain: BTreeMap<String, lights::PlainLight>,
+    origin: DVec3,
+) -> (Baked, Vec<SceneLight>) {
+    let mut lights: Vec<SceneLight> = plain
+        .into_iter()
+        .map(|(name, light)| SceneLight { name, light: light.around(origin), object: None })
+        .collect();
+    for (id, strength, shapes) in std::mem::take(&mut baked.emitters) {
+        let name = &baked.objects[id.0 as usize].name;
+        let digits = shapes.len().saturating_sub(1).to_string().len();
+        let single = shapes.len() == 1;
+        lights.extend(shapes.into_iter().enumerate().map(|(i, shape)| SceneLight {
+            name: if single { name.clone() } else { format!("{name}/{i:0digits$}") },
+            light: area_light(shape, strength),
+            object: Some(id),
+        }));
+    }
+    lights.sort_by(|a, b| a.name.cmp(&b.name));
+    for (index, light) in lights.iter().enumerate() {
+        if let Some(ObjectId(object)) = light.object {
+            baked.objects[object as usize].emitter.get_or_insert(LightId(index as u32));
+        }
+    }
+    (baked, lights)
+}
+
+fn area_light(shape: LightShape, strength: Strength) -> Light {
+    let power = match strength {
+        Strength::Power(power) => power,
+        Strength::Radiance(radiance) => radiance * (PI * f64::from(shape.area())),
+    };
+    Light { shape, power: power.as_vec3() }
+}
+
+/// The resolved text with absolute asset paths, and the hash of the same text with the assets' content in their place:
+/// equal wherever the assets lie, different as soon as they differ.
+fn resolve(config: &mut SceneConfig, contents: &BTreeMap<String, (String, blake3::Hash)>) -> (Arc<str>, u64) {
+    let mut text_with = |path_of: &dyn Fn(&(String, blake3::Hash)) -> String| {
+        for (name, object) in &mut config.object {
+            if let (Some(obj), Some(content)) = (&mut object.obj, contents.get(name)) {
+                obj.path = path_of(content);
+            }
+        }
+        toml::to_string(config).expect("invariant: a validated config has only values that TOML can hold")
+    };
+    let hashed = text_with(&|(_, hash)| format!("blake3:{}", hash.to_hex()));
+    let resolved = text_with(&|(path, _)| path.clone());
+    let hash = blake3::hash(hashed.as_bytes());
+    let [a, b, c, d, e, f, g, h, ..] = *hash.as_bytes();
+    (resolved.into(), u64::from_le_bytes([a, b, c, d, e, f, g, h]))
+}
+
+/// Refuses names that cannot be told from the names of imported and generated things.
+fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError> {
+    if name.is_empty() || name.contains('/') || name.contains(char::is_control) {
+        let expected = "a name of at least one character, without \"/\" and control characters";
+        return Err(field.invalid(format!("{name:?}"), expected, "rename it"));
+    }
+    Ok(())
+}

@@ -1,0 +1,78 @@
+//! Turns `[streaming]` and `[render]` into validated settings, and writes their defaults into the config.
+
+use crate::{
+    config::{Field, RenderConfig, StreamingConfig},
+    error::SceneError,
+    settings::{RenderSettings, StreamingSettings},
+};
+
+/// Largest width and height of a picture in pixels.
+const MAX_PICTURE_PX: u32 = 1 << 14;
+
+pub(super) fn streaming(
+    config: &mut StreamingConfig,
+    field: &Field<'_>,
+) -> Result<StreamingSettings, SceneError> {
+    let d = StreamingSettings::default();
+    let vsls = *config.vsls.get_or_insert(d.vsls);
+    let pool_paths = *config.pool_paths.get_or_insert(d.pool_paths);
+    let seed = *config.seed.get_or_insert(d.seed);
+    let placement_scale = *config.placement_scale.get_or_insert(widen(d.placement_scale));
+    let publish_period_ms = *config.publish_period_ms.get_or_insert(widen(d.publish_period_ms));
+    let light_columns = *config.light_columns.get_or_insert(d.light_columns);
+    if i64::try_from(seed).is_err() {
+        return Err(field.key("seed").invalid(
+            seed,
+            "a whole number from 0 to 9223372036854775807",
+            "choose a smaller seed",
+        ));
+    }
+    if let Some(threads) = config.threads {
+        field.key("threads").count(threads, 1..=1024)?;
+    }
+    Ok(StreamingSettings {
+        vsls: field.key("vsls").count(vsls, 1..=StreamingSettings::MAX_VSLS)?,
+        pool_paths: field.key("pool_paths").count(pool_paths, 1..=StreamingSettings::MAX_POOL_PATHS)?,
+        sampling: *config.sampling.get_or_insert(d.sampling),
+        seed,
+        placement_scale: field
+            .key("placement_scale")
+            .number(placement_scale, "a factor in (0, 1]", |x| x > 0.0 && x <= 1.0)?
+            as f32,
+        publish_period_ms: field.key("publish_period_ms").number(
+            publish_period_ms,
+            "a time from 0.1 to 60000 ms",
+            |x| (0.1..=60_000.0).contains(&x),
+        )? as f32,
+        threads: config.threads,
+        light_columns: field.key("light_columns").count(light_columns, 1..=1024)?,
+    })
+}
+
+pub(super) fn render(config: &mut RenderConfig, field: &Field<'_>) -> Result<RenderSettings, SceneError> {
+    let d = RenderSettings::default();
+    let width = *config.width_px.get_or_insert(d.width);
+    let height = *config.height_px.get_or_insert(d.height);
+    let epsilon = *config.epsilon.get_or_insert(widen(d.epsilon));
+    let light_samples = *config.light_samples.get_or_insert(d.light_samples);
+    let exposure_ev = *config.exposure_ev.get_or_insert(widen(d.exposure_ev));
+    Ok(RenderSettings {
+        width: field.key("width_px").count(width, 1..=MAX_PICTURE_PX)?,
+        height: field.key("height_px").count(height, 1..=MAX_PICTURE_PX)?,
+        kernel: *config.kernel.get_or_insert(d.kernel),
+        visibility: *config.visibility.get_or_insert(d.visibility),
+        epsilon: field
+            .key("epsilon")
+            .number(epsilon, "a radiance from 0 to 1e6 W/(m² sr)", |x| (0.0..=1e6).contains(&x))?
+            as f32,
+        light_samples: field.key("light_samples").count(light_samples, 1..=4096)?,
+        exposure_ev: field.key("exposure_ev").number(exposure_ev, "stops within ±32", |x| x.abs() <= 32.0)?
+            as f32,
+        tone_map: *config.tone_map.get_or_insert(d.tone_map),
+    })
+}
+
+/// The shortest decimal of `x` as f64: 0.9 for 0.9_f32, so that resolved configs read as documented.
+fn widen(x: f32) -> f64 {
+    x.to_string().parse().expect("invariant: a displayed number parses")
+}

@@ -1,0 +1,268 @@
+//! Gathers what a user writes in a scene file, before it is validated: one struct per table, one field per key.
+
+mod decode;
+mod document;
+mod domain;
+mod values;
+
+pub(crate) use document::{Document, Field};
+pub use domain::{MAX_LENGTH_M, MAX_POWER};
+pub use values::{OneOrThree, Vector};
+
+use crate::{
+    scene::Sides,
+    settings::{Sampling, Visibility},
+};
+use photonstream_shading::{Kernel, tone::ToneMap};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A scene file as written. Fields may be changed before [`SceneConfig::build`]; `None` stands for the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneConfig {
+    /// What to call the scene; default: the file's stem.
+    pub name: Option<String>,
+    /// Where the scene's own origin lies; default: near the middle of its geometry.
+    pub origin_m: Option<Vector>,
+    /// From where pictures are taken.
+    pub camera: CameraConfig,
+    /// Reflectances by name.
+    #[serde(default)]
+    pub material: BTreeMap<String, MaterialConfig>,
+    /// Meshes by name.
+    #[serde(default)]
+    pub object: BTreeMap<String, ObjectConfig>,
+    /// Light sources by name.
+    #[serde(default)]
+    pub light: BTreeMap<String, LightConfig>,
+    /// Settings of the simulation.
+    #[serde(default)]
+    pub streaming: StreamingConfig,
+    /// Default settings of the renderers.
+    #[serde(default)]
+    pub render: RenderConfig,
+    #[serde(skip)]
+    pub(crate) document: Document,
+}
+
+/// `[camera]`: a pinhole camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraConfig {
+    /// Where the eye is, m.
+    pub position_m: Vector,
+    /// A point in the middle of the picture, m.
+    pub target_m: Vector,
+    /// Which way is up in the picture; default +Y.
+    pub up: Option<Vector>,
+    /// Field of view from bottom to top.
+    pub vertical_fov_deg: f64,
+}
+
+/// `[material.NAME]`: a diffuse reflectance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialConfig {
+    /// Share of the arriving light that leaves again, linear RGB.
+    pub albedo: OneOrThree,
+}
+
+/// `[object.NAME]`: a mesh, its place and its material. Exactly one shape.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectConfig {
+    /// Name of its material; an import may go without and keep its own.
+    pub material: Option<String>,
+    /// Which sides reflect; default front.
+    #[serde(default, with = "values::by_name")]
+    pub sides: Option<Sides>,
+    /// Where the shape's own origin is put, m.
+    pub position_m: Option<Vector>,
+    /// Turns about the object's own x, then its turned y, then its turned z axis.
+    pub rotation_deg: Option<Vector>,
+    /// Stretches the shape along its own axes, before it is turned; negative factors mirror.
+    pub scale: Option<OneOrThree>,
+    /// A parallelogram.
+    pub quad: Option<QuadConfig>,
+    /// A cuboid centred at its origin.
+    #[serde(rename = "box")]
+    pub cuboid: Option<BoxConfig>,
+    /// A sphere centred at its origin.
+    pub sphere: Option<SphereConfig>,
+    /// A tube along a torus knot.
+    #[serde(rename = "torus-knot")]
+    pub torus_knot: Option<TorusKnotConfig>,
+    /// Meshes of a Wavefront OBJ file.
+    pub obj: Option<ObjConfig>,
+}
+
+/// `quad`: a parallelogram; its front looks along `edge_u_m × edge_v_m`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuadConfig {
+    /// The corner from which both edges start, m.
+    pub corner_m: Vector,
+    /// First edge, m.
+    pub edge_u_m: Vector,
+    /// Second edge, m.
+    pub edge_v_m: Vector,
+}
+
+/// `box`: a cuboid centred at its origin.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxConfig {
+    /// Lengths of its edges along x, y and z, m.
+    pub size_m: Vector,
+}
+
+/// `sphere`: a tessellated sphere centred at its origin, its corners on the radius.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SphereConfig {
+    /// Radius, m.
+    pub radius_m: f64,
+    /// Divisions around and from pole to pole: n give 2 n (n - 1) triangles.
+    pub segments: Option<u32>,
+}
+
+/// `torus-knot`: a tube along a knot that winds on a torus around the y axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorusKnotConfig {
+    /// Windings around the y axis.
+    pub p: Option<u32>,
+    /// Windings around the ring of the torus.
+    pub q: Option<u32>,
+    /// Radius of the ring, m; the knot keeps half of it from the ring.
+    pub radius_m: f64,
+    /// Radius of the tube, m.
+    pub tube_radius_m: f64,
+    /// Divisions along the tube.
+    pub segments: Option<u32>,
+    /// Divisions around the tube.
+    pub tube_segments: Option<u32>,
+}
+
+/// `obj`: one object for each pair of group and material of an OBJ file, called `NAME/group/material`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjConfig {
+    /// The file.
+    pub path: String,
+    /// Groups, materials or `group/material` pairs to leave out.
+    pub exclude: Option<Vec<String>>,
+}
+
+/// `[light.NAME]`: a light source. Exactly one shape.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightConfig {
+    /// Emitted power, W, linear RGB.
+    pub power_w: Option<OneOrThree>,
+    /// Irradiance of a surface that faces a directional light, W m⁻², linear RGB.
+    pub irradiance_w_m2: Option<OneOrThree>,
+    /// A cone of light.
+    pub spot: Option<SpotConfig>,
+    /// The same intensity in all directions.
+    pub point: Option<PointConfig>,
+    /// Parallel light.
+    pub directional: Option<DirectionalConfig>,
+    /// A diffuse parallelogram; an object of the same name shows it.
+    pub rectangle: Option<RectangleConfig>,
+}
+
+/// `spot`: a cone of light with a smooth edge. Exactly one of target and direction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotConfig {
+    /// Where it stands, m.
+    pub position_m: Vector,
+    /// A point on its axis, m.
+    pub target_m: Option<Vector>,
+    /// Its axis, the way the light travels; of any length.
+    pub direction: Option<Vector>,
+    /// Half the opening angle beyond which there is no light.
+    pub outer_half_angle_deg: f64,
+    /// Half the opening angle within which the intensity is full; default 0.9 of the outer.
+    pub inner_half_angle_deg: Option<f64>,
+}
+
+/// `point`: the same intensity in all directions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointConfig {
+    /// Where it stands, m.
+    pub position_m: Vector,
+}
+
+/// `directional`: parallel light from infinitely far away.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionalConfig {
+    /// The way the light travels; of any length.
+    pub direction: Vector,
+}
+
+/// `rectangle`: a diffuse parallelogram; it emits towards `edge_u_m × edge_v_m`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RectangleConfig {
+    /// The corner from which both edges start, m.
+    pub corner_m: Vector,
+    /// First edge, m.
+    pub edge_u_m: Vector,
+    /// Second edge, m.
+    pub edge_v_m: Vector,
+    /// Share of the arriving light that its front reflects; default 0.
+    pub albedo: Option<OneOrThree>,
+}
+
+/// `[streaming]`: settings of the simulation; see [`crate::StreamingSettings`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StreamingConfig {
+    /// Number of virtual surface lights in the scene.
+    pub vsls: Option<u32>,
+    /// Number of paths in the pool.
+    pub pool_paths: Option<u32>,
+    /// Which sample a slot uses when it is traced again.
+    #[serde(default, with = "values::by_name")]
+    pub sampling: Option<Sampling>,
+    /// Seed of placement and streaming.
+    pub seed: Option<u64>,
+    /// Shrinks triangles about their centroid before virtual surface lights are placed.
+    pub placement_scale: Option<f64>,
+    /// Time between published frames.
+    pub publish_period_ms: Option<f64>,
+    /// Tracer threads; default: one per core.
+    pub threads: Option<u32>,
+    /// Lights beyond this number share one column of flux.
+    pub light_columns: Option<u32>,
+}
+
+/// `[render]`: default settings of the renderers; see [`crate::RenderSettings`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderConfig {
+    /// Picture width.
+    pub width_px: Option<u32>,
+    /// Picture height.
+    pub height_px: Option<u32>,
+    /// How the flux of a virtual surface light falls off.
+    #[serde(default, with = "values::by_name")]
+    pub kernel: Option<Kernel>,
+    /// Whether virtual surface lights are shadowed.
+    #[serde(default, with = "values::by_name")]
+    pub visibility: Option<Visibility>,
+    /// Smallest radiance worth adding, W m⁻² sr⁻¹.
+    pub epsilon: Option<f64>,
+    /// Shadow rays per pixel and area light.
+    pub light_samples: Option<u32>,
+    /// Exposure of tone-mapped pictures, in stops.
+    pub exposure_ev: Option<f64>,
+    /// Tone map of PNG pictures.
+    #[serde(default, with = "values::by_name")]
+    pub tone_map: Option<ToneMap>,
+}

@@ -1,0 +1,132 @@
+//! Turns TOML values into vectors, colours and named choices, and back.
+
+use glam::DVec3;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
+
+/// Three numbers `[x, y, z]`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Vector(pub [f64; 3]);
+
+/// One number for all three components, or three numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneOrThree(pub [f64; 3]);
+
+impl Vector {
+    /// As a vector to compute with.
+    pub fn to_dvec3(self) -> DVec3 {
+        DVec3::from_array(self.0)
+    }
+}
+
+impl OneOrThree {
+    /// As a vector to compute with.
+    pub fn to_dvec3(self) -> DVec3 {
+        DVec3::from_array(self.0)
+    }
+}
+
+impl From<DVec3> for Vector {
+    fn from(v: DVec3) -> Self {
+        Self(v.to_array())
+    }
+}
+
+impl Serialize for Vector {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl Serialize for OneOrThree {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Vector {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Components { one: false }).map(Self)
+    }
+}
+
+impl<'de> Deserialize<'de> for OneOrThree {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Components { one: true }).map(Self)
+    }
+}
+
+struct Components {
+    one: bool,
+}
+
+impl<'de> de::Visitor<'de> for Components {
+    type Value = [f64; 3];
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.one { "a number or three numbers [a, b, c]" } else { "three numbers [x, y, z]" })
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<[f64; 3], E> {
+        if self.one { Ok([value; 3]) } else { Err(E::invalid_type(de::Unexpected::Float(value), &self)) }
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<[f64; 3], E> {
+        if self.one {
+            Ok([value as f64; 3])
+        } else {
+            Err(E::invalid_type(de::Unexpected::Signed(value), &self))
+        }
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<[f64; 3], A::Error> {
+        let mut values = Vec::with_capacity(3);
+        while let Some(value) = seq.next_element::<f64>()? {
+            values.push(value);
+        }
+        let count = values.len();
+        values.try_into().map_err(|_| de::Error::invalid_length(count, &self))
+    }
+}
+
+/// A choice that has a name in configs.
+pub(crate) trait Named: Copy {
+    fn config_name(self) -> &'static str;
+}
+
+macro_rules! impl_named {
+    ($($type:ty),+) => { $(impl Named for $type { fn config_name(self) -> &'static str { self.name() } })+ };
+}
+
+impl_named!(
+    crate::scene::Sides,
+    crate::settings::Sampling,
+    crate::settings::Visibility,
+    photonstream_shading::Kernel,
+    photonstream_shading::tone::ToneMap
+);
+
+/// (De)serialises an optional choice by its name.
+pub(super) mod by_name {
+    use super::Named;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+    use std::str::FromStr;
+
+    pub(in crate::config) fn serialize<T: Named, S: Serializer>(
+        value: &Option<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match value {
+            Some(value) => serializer.serialize_some(value.config_name()),
+            None => serializer.serialize_none(),
+        }
+    }
+
+    pub(in crate::config) fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
+    where
+        T: FromStr<Err = String>,
+        D: Deserializer<'de>,
+    {
+        String::deserialize(deserializer)?.parse().map(Some).map_err(de::Error::custom)
+    }
+}
