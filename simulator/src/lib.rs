@@ -1,1 +1,19 @@
-//! A scene into the flux of its virtual surface lights: placement, photon streaming, publishing.
+//! Turns a scene into the flux of its virtual surface lights, and publishes it.
+#![forbid(unsafe_code)]
+
+mod apportion;
+pub mod cli;
+pub mod counters;
+pub mod emitters;
+pub mod error;
+pub mod flux;
+pub mod ledger;
+pub mod owner;
+pub mod placement;
+pub mod pool;
+pub mod records;
+pub mod service;
+pub mod simulation;
+mod streams;
+pub mod tracer;
+pub mod vsl;

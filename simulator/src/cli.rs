@@ -1,0 +1,123 @@
+//! Turns command-line arguments into a running simulator.
+
+use crate::{
+    error::SimulatorError,
+    service::{self, Options, Summary},
+    simulation::Simulation,
+};
+use photonstream_protocol::ChannelName;
+use photonstream_scene::{Sampling, SceneConfig};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use std::{path::PathBuf, sync::Arc, time::Instant};
+
+/// Arguments of `photonstream simulate` and `photonstream-simulator`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Args {
+    /// Scene to simulate: a TOML file
+    pub config: PathBuf,
+    /// Channel to publish on
+    #[arg(long, default_value_t)]
+    pub channel: ChannelName,
+    /// Tracer threads [default: the config's, else one per core]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// Rest after this many paths
+    #[arg(long, value_name = "PATHS")]
+    pub after: Option<u64>,
+    /// Settings that override the config's
+    #[command(flatten)]
+    pub overrides: Overrides,
+}
+
+/// Settings that override the config's `[streaming]` table.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Overrides {
+    /// Lighting method [possible values: photon-streaming]
+    #[arg(long, value_parser = ["photon-streaming"])]
+    pub method: Option<String>,
+    /// Number of virtual surface lights
+    #[arg(long)]
+    pub vsls: Option<u32>,
+    /// Number of paths in the pool
+    #[arg(long, value_name = "PATHS")]
+    pub pool: Option<u32>,
+    /// Seed of placement and streaming
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// `replay` (unchanged scene, unchanged light) or `fresh` (a stream of new samples)
+    #[arg(long)]
+    pub sampling: Option<Sampling>,
+}
+
+impl Overrides {
+    /// Writes what is given into `config`.
+    pub fn apply(&self, config: &mut SceneConfig) {
+        let streaming = &mut config.streaming;
+        streaming.vsls = self.vsls.or(streaming.vsls);
+        streaming.pool_paths = self.pool.or(streaming.pool_paths);
+        streaming.seed = self.seed.or(streaming.seed);
+        streaming.sampling = self.sampling.or(streaming.sampling);
+    }
+
+    /// As arguments for another process.
+    pub fn to_arguments(&self) -> Vec<String> {
+        let mut arguments = Vec::new();
+        let mut add = |name: &str, value: Option<String>| {
+            arguments.extend(value.map(|value| format!("--{name}={value}")));
+        };
+        add("method", self.method.clone());
+        add("vsls", self.vsls.map(|v| v.to_string()));
+        add("pool", self.pool.map(|v| v.to_string()));
+        add("seed", self.seed.map(|v| v.to_string()));
+        add("sampling", self.sampling.map(|v| v.name().to_owned()));
+        arguments
+    }
+}
+
+/// Simulates until a signal (Ctrl-C, SIGTERM, SIGHUP) or a client of the control socket ends it.
+///
+/// # Errors
+/// If the scene cannot be loaded, the channel is taken, or the simulation fails.
+pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
+    let stop = stop_on_signals()?;
+    let begun = Instant::now();
+    let mut config = SceneConfig::from_file(&args.config)?;
+    args.overrides.apply(&mut config);
+    let scene = config.build()?;
+    for notice in &scene.notices {
+        tracing::warn!("{}: {notice}", scene.name);
+    }
+    let loaded = begun.elapsed();
+    let simulation = Simulation::new(Arc::new(scene));
+    tracing::info!(
+        scene = %simulation.scene.name,
+        triangles = simulation.scene.geometry.triangles.len(),
+        lights = simulation.scene.lights.len(),
+        vsls = simulation.placement.vsls.len(),
+        pool_paths = simulation.emitters.slots,
+        load_ms = loaded.as_millis() as u64,
+        place_ms = (begun.elapsed() - loaded).as_millis() as u64,
+        channel = %args.channel,
+        "simulating",
+    );
+    let options = Options {
+        channel: args.channel.clone(),
+        threads: args.threads.map(|t| t as usize),
+        after_paths: args.after,
+    };
+    service::run(simulation, &options, &stop)
+}
+
+/// A channel that gets a message with the first signal that asks for the end.
+fn stop_on_signals() -> Result<flume::Receiver<()>, SimulatorError> {
+    let (sender, stop) = flume::bounded(1);
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(SimulatorError::Signals)?;
+    service::spawn("signals", move || {
+        for _ in signals.forever() {
+            // A second signal changes nothing: the end is under way.
+            let _ = sender.try_send(());
+        }
+    })?;
+    Ok(stop)
+}

@@ -1,0 +1,201 @@
+//! Turns placed lights into the table of their owners: for each cell the lights that can be nearest within it.
+
+use super::{Candidate, Grid, NO_CELLS, OwnerTable, SEVERAL};
+use crate::{
+    placement::Placement,
+    vsl::{COMPATIBLE_COSINE, Surface},
+};
+use glam::Vec3;
+use photonstream_scene::{Geometry, Scene};
+use photonstream_shading::surface;
+use rayon::prelude::*;
+use rstar::{RTree, primitives::GeomWithData};
+use std::ops::Range;
+
+/// Edge of a cell as a share of the mean distance between lights: smaller cells have fewer candidates and more memory.
+const CELL_PER_SPACING: f32 = 0.5;
+/// Most cells along one edge of a triangle.
+const MOST_CELLS: f32 = 4096.0;
+/// Triangles in one unit of parallel work.
+const TRIANGLES_PER_TASK: u32 = 1024;
+
+impl OwnerTable {
+    /// The table of `placement` on `scene`; the same on any number of threads.
+    pub fn new(scene: &Scene, placement: &Placement) -> Self {
+        let none = Grid { first: NO_CELLS, columns: 0, rows: 0 };
+        let mut table = Self {
+            grids: vec![[none; 2]; scene.geometry.triangles.len()],
+            cells: vec![],
+            candidates: vec![],
+        };
+        for (surface, vsls) in &placement.surfaces {
+            if vsls.is_empty() {
+                continue;
+            }
+            let lights = Lights::new(&scene.geometry, placement, vsls.clone());
+            let triangles = scene.objects[surface.object.0 as usize].triangles.clone();
+            let spacing = lights.spacing(&scene.geometry, triangles.clone());
+            let starts: Vec<u32> = triangles.clone().step_by(TRIANGLES_PER_TASK as usize).collect();
+            let parts: Vec<Part> = starts
+                .into_par_iter()
+                .map(|start| {
+                    let end = start.saturating_add(TRIANGLES_PER_TASK).min(triangles.end);
+                    let mut part = Part::default();
+                    (start..end).for_each(|t| {
+                        part.add_triangle(&scene.geometry, &lights, t, spacing * CELL_PER_SPACING)
+                    });
+                    part
+                })
+                .collect();
+            for (part, start) in parts.into_iter().zip(triangles.step_by(TRIANGLES_PER_TASK as usize)) {
+                table.append(*surface, start, part);
+            }
+        }
+        table
+    }
+
+    fn append(&mut self, surface: Surface, start: u32, part: Part) {
+        let (first_cell, first_candidate) = (self.cells.len() as u32, self.candidates.len() as u32);
+        for (offset, mut grid) in part.grids.into_iter().enumerate() {
+            grid.first += first_cell;
+            self.grids[start as usize + offset][surface.side as usize] = grid;
+        }
+        self.cells
+            .extend(part.cells.into_iter().map(|c| if c & SEVERAL != 0 { c + first_candidate } else { c }));
+        self.candidates.extend(part.candidates);
+    }
+}
+
+/// The lights of one surface, to be searched.
+struct Lights {
+    first: u32,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    tree: RTree<GeomWithData<[f32; 3], u32>>,
+}
+
+impl Lights {
+    fn new(geometry: &Geometry, placement: &Placement, range: Range<u32>) -> Self {
+        let vsls = &placement.vsls[range.start as usize..range.end as usize];
+        let positions: Vec<Vec3> = vsls.iter().map(|v| v.position_rest(geometry)).collect();
+        let normals = vsls.iter().map(|v| geometry.normals[v.triangle as usize]).collect();
+        let items =
+            positions.iter().enumerate().map(|(i, p)| GeomWithData::new(p.to_array(), i as u32)).collect();
+        Self { first: range.start, positions, normals, tree: RTree::bulk_load(items) }
+    }
+
+    /// The mean distance between lights: the edge of a square with a light's mean area.
+    fn spacing(&self, geometry: &Geometry, triangles: Range<u32>) -> f32 {
+        let area: f64 = triangles.map(|t| surface::area(geometry.rest_triangle(t))).sum();
+        (area / self.positions.len() as f64).sqrt() as f32
+    }
+
+    /// All lights that can be the nearest compatible one of a point within `radius` of `centre`, with their squared
+    /// distances from `centre`, nearest first.
+    fn near(&self, centre: Vec3, radius: f32, normal: Vec3) -> Vec<(f32, u32)> {
+        let found =
+            self.nearest_first(centre, radius, |i| normal.dot(self.normals[i as usize]) >= COMPATIBLE_COSINE);
+        if found.is_empty() { self.nearest_first(centre, radius, |_| true) } else { found }
+    }
+
+    fn nearest_first(&self, centre: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Vec<(f32, u32)> {
+        let mut found = Vec::new();
+        let mut limit_sq = f32::INFINITY;
+        for item in self.tree.nearest_neighbor_iter(centre.to_array()) {
+            let distance_sq = centre.distance_squared(self.positions[item.data as usize]);
+            if distance_sq > limit_sq {
+                break;
+            }
+            if accept(item.data) {
+                if found.is_empty() {
+                    // At distance d from the centre, the nearest is within d + r of any point of the cell, hence
+                    // within d + 2r of the centre; the factor covers the rounding of squares and roots.
+                    limit_sq = (distance_sq.sqrt() + 2.0 * radius).powi(2) * 1.000_01;
+                }
+                found.push((distance_sq, item.data));
+            }
+        }
+        // The tree yields equal distances in any order.
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found
+    }
+}
+
+/// The table of a run of triangles; indices count from its own start.
+#[derive(Default)]
+struct Part {
+    grids: Vec<Grid>,
+    cells: Vec<u32>,
+    candidates: Vec<Candidate>,
+}
+
+impl Part {
+    fn add_triangle(&mut self, geometry: &Geometry, lights: &Lights, triangle: u32, cell_edge: f32) {
+        let [a, b, c] = geometry.rest_triangle(triangle);
+        let (edge_u, edge_v) = (b - a, c - a);
+        let count = |edge: Vec3| (edge.length() / cell_edge).ceil().clamp(1.0, MOST_CELLS);
+        let (columns, rows) = (count(edge_u), count(edge_v));
+        let grid = Grid { first: self.cells.len() as u32, columns: columns as u16, rows: rows as u16 };
+        let (step_u, step_v) = (edge_u / columns, edge_v / rows);
+        let radius = 0.5 * (step_u + step_v).length().max((step_u - step_v).length());
+        let normal = geometry.normals[triangle as usize];
+        for row in 0..grid.rows {
+            for column in 0..grid.columns {
+                let (u, v) = ((f32::from(column) + 0.5) / columns, (f32::from(row) + 0.5) / rows);
+                let outside = f32::from(column) / columns + f32::from(row) / rows > 1.0;
+                let cell = if outside {
+                    // Never hit but by rounding: the neighbour's answer serves.
+                    *self.cells.last().expect("invariant: the first cell of a grid touches the triangle")
+                } else {
+                    let centre = a + edge_u * u + edge_v * v;
+                    let near = lights.near(centre, radius, normal);
+                    self.cell(lights, centre, [edge_u, edge_v], [step_u, step_v], &near)
+                };
+                self.cells.push(cell);
+            }
+        }
+        self.grids.push(grid);
+    }
+
+    /// The entry for a cell whose nearest light is among `near`: drops each light that another beats in all four
+    /// corners, hence, the difference of squared distances being linear, everywhere in the cell.
+    fn cell(
+        &mut self,
+        lights: &Lights,
+        centre: Vec3,
+        edges: [Vec3; 2],
+        steps: [Vec3; 2],
+        near: &[(f32, u32)],
+    ) -> u32 {
+        let first = self.candidates.len();
+        let candidate = |&(distance_sq, index): &(f32, u32)| {
+            let to_light = lights.positions[index as usize] - centre;
+            let [per_u, per_v] = edges.map(|edge| -2.0 * to_light.dot(edge));
+            Candidate { vsl: lights.first + index, run: 0, at_centre: distance_sq, per_u, per_v }
+        };
+        let corners = |&(distance_sq, index): &(f32, u32)| {
+            let to_light = lights.positions[index as usize] - centre;
+            let [half_u, half_v] = steps.map(|step| -to_light.dot(step));
+            [half_u + half_v, half_u - half_v, half_v - half_u, -half_u - half_v].map(|x| distance_sq + x)
+        };
+        let at_corners: Vec<[f32; 4]> = near.iter().map(corners).collect();
+        // Beaten by a clear margin, so that rounding drops nobody who could win.
+        let margin = near[0].0.max(steps[0].length_squared() + steps[1].length_squared()) * 1e-5;
+        for (i, light) in near.iter().enumerate() {
+            let beaten =
+                (0..near.len()).any(|other| (0..4).all(|c| at_corners[other][c] + margin < at_corners[i][c]));
+            if !beaten {
+                self.candidates.push(candidate(light));
+            }
+        }
+        let run = self.candidates.len() - first;
+        if run == 1 {
+            self.candidates.pop().expect("invariant: one candidate was pushed").vsl
+        } else {
+            // Ties go to the lowest index, whatever the cell.
+            self.candidates[first..].sort_by_key(|c| c.vsl);
+            self.candidates[first].run = run as u32;
+            SEVERAL | first as u32
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Turns a number of virtual surface lights into the share of each surface, by area.
+
+use crate::{apportion::apportion, vsl::Surface};
+use photonstream_scene::{ObjectId, Scene};
+use photonstream_shading::surface;
+
+/// How many lights a surface gets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Share {
+    pub(super) surface: Surface,
+    pub(super) vsls: u32,
+}
+
+/// At least one light for each reflecting side of each object with triangles, the rest by area (largest remainder), so
+/// that the sum is `vsls`, or the number of surfaces where that is more. Ordered by surface.
+pub(super) fn by_area(scene: &Scene, vsls: u32) -> Vec<Share> {
+    let mut surfaces = Vec::new();
+    for (index, object) in scene.objects.iter().enumerate() {
+        let area: f64 =
+            object.triangles.clone().map(|t| surface::area(scene.geometry.rest_triangle(t))).sum();
+        if !object.triangles.is_empty() {
+            let id = ObjectId(index as u32);
+            surfaces.extend(object.sides.iter().map(|side| (Surface { object: id, side }, area)));
+        }
+    }
+    let areas: Vec<f64> = surfaces.iter().map(|&(_, area)| area).collect();
+    let counts = apportion(&areas, vsls);
+    surfaces.into_iter().zip(counts).map(|((surface, _), vsls)| Share { surface, vsls }).collect()
+}

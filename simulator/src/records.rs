@@ -1,0 +1,95 @@
+//! Turns the simulator's state into the records that renderers read.
+
+use crate::{counters::Counters, flux::FluxReading, placement::Placement};
+use photonstream_protocol::{LightRecord, ObjectRecord, VslRecord};
+use photonstream_scene::Scene;
+use photonstream_shading::LightShape;
+
+/// One record for each virtual surface light: where it is, without its flux.
+pub fn vsl_records(scene: &Scene, placement: &Placement) -> Vec<VslRecord> {
+    placement
+        .vsls
+        .iter()
+        .map(|vsl| VslRecord {
+            object: vsl.surface.object.0,
+            position: vsl.position_ws(&scene.geometry).to_array(),
+            normal: vsl.normal_ws(&scene.geometry).to_array(),
+            area: vsl.area,
+            ..VslRecord::default()
+        })
+        .collect()
+}
+
+/// Writes flux, standard error and age into the records; `now_ms` counts since the simulation started.
+pub fn write_flux(records: &mut [VslRecord], readings: impl Iterator<Item = FluxReading>, now_ms: u32) {
+    for (record, reading) in records.iter_mut().zip(readings) {
+        record.flux = reading.flux.to_array();
+        record.standard_error = reading.standard_error;
+        let has_paths = reading.mean_birth_ms > 0.0;
+        record.mean_age_s =
+            if has_paths { ((f64::from(now_ms) - reading.mean_birth_ms) / 1e3).max(0.0) as f32 } else { 0.0 };
+    }
+}
+
+/// One record for each object: its motion from rest space to the scene's space.
+pub fn object_records(scene: &Scene) -> Vec<ObjectRecord> {
+    (0u32..)
+        .zip(&scene.objects)
+        .map(|(id, object)| ObjectRecord {
+            id,
+            world_from_object: object.world_from_rest.to_cols_array(),
+            ..ObjectRecord::default()
+        })
+        .collect()
+}
+
+/// One record for each light.
+pub fn light_records(scene: &Scene) -> Vec<LightRecord> {
+    scene
+        .lights
+        .iter()
+        .map(|light| {
+            let mut record = LightRecord {
+                enabled: 1,
+                power: light.light.power.to_array(),
+                object: light.object.map_or(u32::MAX, |o| o.0),
+                ..LightRecord::default()
+            };
+            match light.light.shape {
+                LightShape::Point { position } => record.position = position.to_array(),
+                LightShape::Spot { position, direction, versine_inner, versine_outer } => {
+                    record.kind = 1;
+                    record.position = position.to_array();
+                    record.direction = direction.to_array();
+                    record.versine_inner = versine_inner;
+                    record.versine_outer = versine_outer;
+                }
+                LightShape::Directional { direction } => {
+                    record.kind = 2;
+                    record.direction = direction.to_array();
+                }
+                LightShape::Parallelogram { corner, edge_u, edge_v }
+                | LightShape::Triangle { corner, edge_u, edge_v } => {
+                    record.kind =
+                        if matches!(light.light.shape, LightShape::Triangle { .. }) { 4 } else { 3 };
+                    record.position = corner.to_array();
+                    record.edge_u = edge_u.to_array();
+                    record.edge_v = edge_v.to_array();
+                    record.direction = light.light.shape.emitter_normal().to_array();
+                }
+            }
+            record
+        })
+        .collect()
+}
+
+/// Copies counters into the published statistics.
+pub(crate) fn write_counters(statistics: &mut photonstream_protocol::StatisticsRecord, counters: &Counters) {
+    statistics.paths_total = counters.paths;
+    statistics.rays_total = counters.rays;
+    statistics.deposits_total = counters.deposits;
+    statistics.escaped = counters.escaped;
+    statistics.rejected = counters.rejected;
+    statistics.truncated = counters.truncated;
+    statistics.absorbed_back = counters.absorbed_back;
+}

@@ -1,0 +1,242 @@
+//! Turns requests and signals into what the actors do, from their start to their end.
+
+use super::{
+    ledger_actor::{LedgerActor, ToLedger},
+    publisher_actor::{self, Still},
+    spawn, tracer_actor,
+};
+use crate::{counters::Counters, error::SimulatorError, records, simulation::Simulation};
+use photonstream_protocol::{
+    ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, SegmentSpec,
+};
+use serde::Serialize;
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+/// How a simulation is to run.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Where it publishes.
+    pub channel: ChannelName,
+    /// Tracer threads; `None`: as the scene says, else one per core.
+    pub threads: Option<usize>,
+    /// Rest after this many paths.
+    pub after_paths: Option<u64>,
+}
+
+/// Why a simulation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// The caller's stop channel said so: a signal.
+    Stopped,
+    /// A client of the control socket asked for it.
+    Shutdown,
+}
+
+/// What a simulation did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Name of the scene.
+    pub scene: String,
+    /// Why it ended.
+    pub ending: Ending,
+    /// Seconds it ran.
+    pub seconds: f64,
+    /// Frames published.
+    pub frames: u64,
+    /// Events since the start.
+    #[serde(flatten)]
+    pub counters: Counters,
+}
+
+/// Runs a simulation on a channel until `stop` gets a message or is closed, or a client asks for its end.
+///
+/// # Errors
+/// If the channel is taken or shared memory fails, or an actor ends before its time.
+pub fn run(
+    simulation: Simulation,
+    options: &Options,
+    stop: &flume::Receiver<()>,
+) -> Result<Summary, SimulatorError> {
+    let director = Director::start(simulation, options)?;
+    let ending = director.direct(stop)?;
+    director.end(ending)
+}
+
+enum Event {
+    Stop,
+    Request(Incoming),
+    LedgerGone,
+}
+
+struct Director {
+    scene_name: String,
+    started: Instant,
+    server: ControlServer,
+    to_ledger: flume::Sender<ToLedger>,
+    latest_frame: Arc<AtomicU64>,
+    ledger: JoinHandle<Counters>,
+    ledger_alive: flume::Receiver<()>,
+    publisher: JoinHandle<Result<(), ProtocolError>>,
+    tracers: Vec<JoinHandle<()>>,
+}
+
+impl Director {
+    fn start(simulation: Simulation, options: &Options) -> Result<Self, SimulatorError> {
+        let scene = Arc::clone(&simulation.scene);
+        let threads = options
+            .threads
+            .or(scene.streaming.threads.map(|t| t as usize))
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+            .max(1);
+        let place = records::vsl_records(&scene, &simulation.placement);
+        let still = Still {
+            objects: records::object_records(&scene),
+            lights: records::light_records(&scene),
+            scene_text: Arc::clone(&scene.resolved_text),
+        };
+        let spec = SegmentSpec {
+            vsl_capacity: place.len().max(1) as u32,
+            object_capacity: still.objects.len().max(1) as u32,
+            light_capacity: still.lights.len().max(1) as u32,
+            scene_text_capacity: still.scene_text.len() as u32,
+            scene_hash: scene.hash,
+            slots: 3,
+        };
+        let publisher = Publisher::create(&options.channel, &spec)?;
+        let server = ControlServer::start(&publisher)?;
+
+        let (work_sender, work) = flume::bounded(2 * threads + 2);
+        let (to_ledger, inbox) = flume::bounded(4 * threads + 16);
+        let (snapshot_sender, snapshots) = flume::bounded(1);
+        // Two sets of records go round: one is filled while the other is published.
+        let (emptied_sender, emptied) = flume::bounded(2);
+        for records in [place.clone(), place] {
+            emptied_sender.send(records).expect("invariant: the channel holds two and has a receiver");
+        }
+        let tracers = (0..threads)
+            .map(|_| {
+                let (work, to_ledger) = (work.clone(), to_ledger.clone());
+                spawn("tracer", move || tracer_actor::run(&work, &to_ledger))
+            })
+            .collect::<Result<_, _>>()?;
+        let latest_frame = Arc::new(AtomicU64::new(0));
+        let publisher = {
+            let latest_frame = Arc::clone(&latest_frame);
+            spawn("publisher", move || {
+                publisher_actor::run(publisher, &still, &snapshots, &emptied_sender, &latest_frame)
+            })?
+        };
+        let actor = LedgerActor {
+            simulation,
+            threads,
+            inbox,
+            work: work_sender,
+            snapshots: snapshot_sender,
+            emptied,
+            after_paths: options.after_paths,
+        };
+        // Nothing is ever sent here: the ledger's end closes it, and the director sees that.
+        let (alive, ledger_alive) = flume::bounded(1);
+        let ledger = spawn("ledger", move || {
+            let _alive: flume::Sender<()> = alive;
+            actor.run()
+        })?;
+        Ok(Self {
+            scene_name: scene.name.clone(),
+            started: Instant::now(),
+            server,
+            to_ledger,
+            latest_frame,
+            ledger,
+            ledger_alive,
+            publisher,
+            tracers,
+        })
+    }
+
+    fn direct(&self, stop: &flume::Receiver<()>) -> Result<Ending, SimulatorError> {
+        loop {
+            let event = flume::Selector::new()
+                .recv(stop, |_| Event::Stop)
+                .recv(self.server.requests(), |request| request.map_or(Event::Stop, Event::Request))
+                .recv(&self.ledger_alive, |_| Event::LedgerGone)
+                .wait();
+            match event {
+                Event::Stop => return Ok(Ending::Stopped),
+                // Its own result, or the publisher's, says why; `end` collects them.
+                Event::LedgerGone => return Ok(Ending::Stopped),
+                Event::Request(Incoming { request, replier, .. }) => {
+                    let ends = matches!(request, Request::Shutdown);
+                    let reply = self.answer(request);
+                    replier.reply(reply);
+                    if ends {
+                        return Ok(Ending::Shutdown);
+                    }
+                }
+            }
+        }
+    }
+
+    fn answer(&self, request: Request) -> Reply {
+        let tell = |message| match self.to_ledger.send(message) {
+            // The next frame is the first that can show it.
+            Ok(()) => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) + 1 },
+            Err(_) => Reply::error("ending", "the simulation is ending"),
+        };
+        match request {
+            Request::Pause => tell(ToLedger::Pause),
+            Request::Resume => tell(ToLedger::Resume),
+            Request::Step => tell(ToLedger::Step),
+            Request::Shutdown => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
+            Request::Query => {
+                let (sender, receiver) = flume::bounded(1);
+                let asked = self.to_ledger.send(ToLedger::Query(sender)).is_ok();
+                match receiver.recv_timeout(Duration::from_secs(2)) {
+                    Ok(state) if asked => match serde_json::to_value(state) {
+                        Ok(state) => Reply::State { state },
+                        Err(error) => Reply::error("internal", error.to_string()),
+                    },
+                    _ => Reply::error("busy", "the simulation did not answer within 2 s; try again"),
+                }
+            }
+            other => {
+                let name = format!("{other:?}");
+                let name = name.split([' ', '{', '(']).next().unwrap_or_default().to_owned();
+                Reply::error(
+                    "unsupported",
+                    format!(
+                        "this simulator cannot change a running scene yet ({name}); restart it with the edited config"
+                    ),
+                )
+            }
+        }
+    }
+
+    /// Ends all actors and collects what they have to say.
+    fn end(self, ending: Ending) -> Result<Summary, SimulatorError> {
+        // The ledger may be gone already.
+        let _ = self.to_ledger.send(ToLedger::Stop);
+        let counters = self.ledger.join().map_err(|_| SimulatorError::ActorStopped { actor: "ledger" })?;
+        drop(self.to_ledger);
+        for tracer in self.tracers {
+            tracer.join().map_err(|_| SimulatorError::ActorStopped { actor: "tracer" })?;
+        }
+        self.publisher.join().map_err(|_| SimulatorError::ActorStopped { actor: "publisher" })??;
+        let frames = self.latest_frame.load(Ordering::Acquire);
+        Ok(Summary {
+            scene: self.scene_name,
+            ending,
+            seconds: self.started.elapsed().as_secs_f64(),
+            frames,
+            counters,
+        })
+    }
+}

@@ -1,0 +1,281 @@
+//! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
+
+use super::{publisher_actor::Snapshot, tracer_actor::Work};
+use crate::{
+    counters::Counters,
+    ledger::{Ledger, Task},
+    records,
+    simulation::Simulation,
+    tracer::{PathBatch, Tracer},
+};
+use photonstream_protocol::{StatisticsRecord, VslRecord, monotonic_ns};
+use serde::Serialize;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+/// What reaches the ledger.
+pub(super) enum ToLedger {
+    /// A tracer has finished a task.
+    Finished { task: Task, batch: PathBatch },
+    /// Stop handing out work.
+    Pause,
+    /// Go on.
+    Resume,
+    /// While paused: go on until the next frame.
+    Step,
+    /// Tell the present state.
+    Query(flume::Sender<State>),
+    /// End.
+    Stop,
+}
+
+/// What `query` answers: the simulator's present state.
+#[derive(Clone, Debug, Serialize)]
+pub struct State {
+    /// Name of the scene.
+    pub scene: String,
+    /// Hash of the scene, in hexadecimal.
+    pub scene_hash: String,
+    /// Whether the simulation is paused.
+    pub paused: bool,
+    /// Whether all light that the settings ask for has been traced.
+    pub converged: bool,
+    /// Number of virtual surface lights.
+    pub vsls: usize,
+    /// Slots of the path pool.
+    pub pool_paths: u32,
+    /// Slots that hold a path.
+    pub pool_valid: u32,
+    /// Tracer threads.
+    pub threads: usize,
+    /// Paths traced a second, over the time in which there was work.
+    pub paths_per_s: f64,
+    /// Rays traced a second, likewise.
+    pub rays_per_s: f64,
+    /// Seconds since the simulation started.
+    pub uptime_s: f64,
+    /// Events since the start.
+    #[serde(flatten)]
+    pub counters: Counters,
+}
+
+/// Publishing may take at most this share of the ledger's time.
+const PUBLISHING_SHARE: u32 = 10;
+
+/// Runs the ledger until it is stopped or everybody it works with is gone.
+pub(super) struct LedgerActor {
+    pub(super) simulation: Simulation,
+    pub(super) threads: usize,
+    pub(super) inbox: flume::Receiver<ToLedger>,
+    pub(super) work: flume::Sender<Work>,
+    pub(super) snapshots: flume::Sender<Snapshot>,
+    pub(super) emptied: flume::Receiver<Vec<VslRecord>>,
+    /// Stop handing out work after this many paths.
+    pub(super) after_paths: Option<u64>,
+}
+
+struct Progress {
+    ledger: Ledger,
+    tracer: Arc<Tracer>,
+    spare: Vec<PathBatch>,
+    started: Instant,
+    paused: bool,
+    stepping: bool,
+    /// Something differs from the last published frame.
+    changed: bool,
+    next_frame: Instant,
+    paths_given: u64,
+    /// Time in which there was work, and since when there is.
+    active: Duration,
+    active_since: Option<Instant>,
+}
+
+impl LedgerActor {
+    pub(super) fn run(self) -> Counters {
+        let period =
+            Duration::from_secs_f32(self.simulation.scene.streaming.publish_period_ms.max(0.1) / 1e3);
+        let started = Instant::now();
+        let mut progress = Progress {
+            ledger: self.simulation.ledger(),
+            tracer: Arc::new(self.simulation.tracer.clone()),
+            spare: Vec::new(),
+            started,
+            paused: false,
+            stepping: false,
+            changed: true,
+            next_frame: started + period,
+            paths_given: 0,
+            active: Duration::ZERO,
+            active_since: None,
+        };
+        loop {
+            if !self.hand_out(&mut progress) {
+                break;
+            }
+            let now = Instant::now();
+            progress.note_activity(now);
+            let done = self.is_done(&progress);
+            let settled = progress.ledger.in_flight() == 0;
+            if progress.changed && (now >= progress.next_frame || (settled && (done || progress.paused))) {
+                match self.publish(&mut progress, done, period) {
+                    Published::Yes => {}
+                    Published::Later => progress.next_frame = now + Duration::from_millis(1),
+                    Published::Gone => break,
+                }
+            }
+            let message = if progress.changed {
+                match self.inbox.recv_deadline(progress.next_frame) {
+                    Ok(message) => message,
+                    Err(flume::RecvTimeoutError::Timeout) => continue,
+                    Err(flume::RecvTimeoutError::Disconnected) => break,
+                }
+            } else {
+                match self.inbox.recv() {
+                    Ok(message) => message,
+                    Err(flume::RecvError::Disconnected) => break,
+                }
+            };
+            if !self.handle(message, &mut progress) {
+                break;
+            }
+        }
+        progress.ledger.counters()
+    }
+
+    /// Keeps the tracers busy. False if there are none any more.
+    fn hand_out(&self, progress: &mut Progress) -> bool {
+        let most = 2 * self.threads as u64 + 2;
+        while progress.ledger.in_flight() < most
+            && (!progress.paused || progress.stepping)
+            && self.after_paths.is_none_or(|limit| progress.paths_given < limit)
+        {
+            let Some(task) = progress.ledger.next_task() else { break };
+            progress.paths_given += u64::from(task.count);
+            let batch = progress.spare.pop().unwrap_or_default();
+            let tracer = Arc::clone(&progress.tracer);
+            if self.work.send(Work { tracer, task, batch }).is_err() {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn is_done(&self, progress: &Progress) -> bool {
+        let limited = self.after_paths.is_some_and(|limit| progress.paths_given >= limit);
+        progress.ledger.is_converged() || (limited && progress.ledger.in_flight() == 0)
+    }
+
+    /// False where it is time to end.
+    fn handle(&self, message: ToLedger, progress: &mut Progress) -> bool {
+        match message {
+            ToLedger::Finished { task, batch } => {
+                let birth_ms = progress.now_ms();
+                progress.spare.extend(progress.ledger.apply(task, batch, birth_ms));
+                progress.changed = true;
+            }
+            ToLedger::Pause => {
+                progress.changed |= !progress.paused;
+                progress.paused = true;
+            }
+            ToLedger::Resume => {
+                progress.changed |= progress.paused;
+                progress.paused = false;
+                progress.stepping = false;
+            }
+            ToLedger::Step => progress.stepping = progress.paused,
+            ToLedger::Query(reply) => {
+                // Whoever asked may have gone.
+                let _ = reply.send(self.state(progress));
+            }
+            ToLedger::Stop => return false,
+        }
+        true
+    }
+
+    fn publish(&self, progress: &mut Progress, converged: bool, period: Duration) -> Published {
+        let Ok(mut vsls) = self.emptied.try_recv() else { return Published::Later };
+        let begun = Instant::now();
+        let scene = &self.simulation.scene;
+        records::write_flux(&mut vsls, progress.ledger.readings(scene), progress.now_ms());
+        let statistics = self.statistics(progress, converged);
+        let snapshot = Snapshot { vsls, statistics, paused: progress.paused };
+        if self.snapshots.send(snapshot).is_err() {
+            return Published::Gone;
+        }
+        let now = Instant::now();
+        progress.next_frame = now + period.max((now - begun) * PUBLISHING_SHARE);
+        progress.changed = false;
+        progress.stepping = false;
+        Published::Yes
+    }
+
+    fn statistics(&self, progress: &Progress, converged: bool) -> StatisticsRecord {
+        let scene = &self.simulation.scene;
+        let counters = progress.ledger.counters();
+        let seconds = progress.active_time(Instant::now()).as_secs_f64().max(1e-6);
+        let uptime = progress.started.elapsed().as_secs_f64();
+        let mut statistics = StatisticsRecord {
+            origin_m: scene.origin_m.to_array(),
+            paths_per_s: counters.paths as f64 / seconds,
+            rays_per_s: counters.rays as f64 / seconds,
+            deposits_per_s: counters.deposits as f64 / seconds,
+            pool_paths: u64::from(progress.ledger.pool().slots()),
+            pool_valid: progress.ledger.pool().valid().iter().map(|&v| u64::from(v)).sum(),
+            converged: u64::from(converged),
+            simulation_time_s: uptime,
+            threads: self.threads as u64,
+            traced_ns: monotonic_ns(),
+            ..StatisticsRecord::default()
+        };
+        records::write_counters(&mut statistics, &counters);
+        statistics
+    }
+
+    fn state(&self, progress: &Progress) -> State {
+        let statistics = self.statistics(progress, self.is_done(progress));
+        State {
+            scene: self.simulation.scene.name.clone(),
+            scene_hash: format!("{:016x}", self.simulation.scene.hash),
+            paused: progress.paused,
+            converged: statistics.converged == 1,
+            vsls: self.simulation.placement.vsls.len(),
+            pool_paths: statistics.pool_paths as u32,
+            pool_valid: statistics.pool_valid as u32,
+            threads: self.threads,
+            paths_per_s: statistics.paths_per_s,
+            rays_per_s: statistics.rays_per_s,
+            uptime_s: statistics.simulation_time_s,
+            counters: progress.ledger.counters(),
+        }
+    }
+}
+
+impl Progress {
+    fn now_ms(&self) -> u32 {
+        u32::try_from(self.started.elapsed().as_millis()).unwrap_or(u32::MAX)
+    }
+
+    fn note_activity(&mut self, now: Instant) {
+        match (self.ledger.in_flight() > 0, self.active_since) {
+            (true, None) => self.active_since = Some(now),
+            (false, Some(since)) => {
+                self.active += now - since;
+                self.active_since = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn active_time(&self, now: Instant) -> Duration {
+        self.active + self.active_since.map_or(Duration::ZERO, |since| now - since)
+    }
+}
+
+enum Published {
+    Yes,
+    /// The publisher still has the memory.
+    Later,
+    Gone,
+}

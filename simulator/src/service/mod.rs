@@ -1,0 +1,33 @@
+//! Turns a scene into a running service: actors joined by channels, each owning what it writes.
+//!
+//! ```text
+//! control socket ─┐
+//! signals ────────┴─ director ─→ ledger ⇄ tracers × N        (tasks out, finished batches in)
+//!                                  └────→ publisher ─→ shared memory
+//! ```
+//!
+//! The director decides, the ledger alone writes pool and flux, tracers have no state, the publisher alone writes shared
+//! memory. All channels are bounded: who is slow slows down who feeds it. When nothing is left to trace every thread
+//! sleeps.
+
+mod director;
+mod ledger_actor;
+mod publisher_actor;
+mod tracer_actor;
+
+pub use director::{Ending, Options, Summary, run};
+pub use ledger_actor::State;
+
+use crate::error::SimulatorError;
+use std::thread::JoinHandle;
+
+/// Starts a named thread.
+pub(crate) fn spawn<T: Send + 'static>(
+    actor: &'static str,
+    body: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, SimulatorError> {
+    std::thread::Builder::new()
+        .name(actor.to_owned())
+        .spawn(body)
+        .map_err(|source| SimulatorError::Spawn { actor, source })
+}

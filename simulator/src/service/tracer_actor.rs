@@ -1,0 +1,25 @@
+//! Turns tasks into finished batches, on as many threads as asked for.
+
+use super::ledger_actor::ToLedger;
+use crate::{
+    ledger::Task,
+    tracer::{PathBatch, Tracer},
+};
+use std::sync::Arc;
+
+/// Work for a tracer thread, with the memory to put the result in.
+pub(super) struct Work {
+    pub(super) tracer: Arc<Tracer>,
+    pub(super) task: Task,
+    pub(super) batch: PathBatch,
+}
+
+/// Takes work until there is nobody left to give it or to take the result.
+pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>) {
+    while let Ok(Work { tracer, task, mut batch }) = work.recv() {
+        tracer.trace(task.first_slot, task.count, task.generation, &mut batch);
+        if ledger.send(ToLedger::Finished { task, batch }).is_err() {
+            return;
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Turns a scene into everything that streaming through it needs, and traces it without actors: for tests, benchmarks
+//! and whoever embeds the simulator.
+
+use crate::{
+    emitters::Emitters,
+    ledger::Ledger,
+    owner::OwnerTable,
+    placement::Placement,
+    tracer::{PathBatch, Tracer},
+};
+use photonstream_scene::Scene;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A scene made ready for streaming. Immutable; shared by all threads.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Its virtual surface lights.
+    pub placement: Arc<Placement>,
+    /// Who owns which hit.
+    pub owners: Arc<OwnerTable>,
+    /// How the pool is split among the lights.
+    pub emitters: Arc<Emitters>,
+    /// Traces paths through it.
+    pub tracer: Tracer,
+}
+
+impl Simulation {
+    /// Places virtual surface lights on `scene` and prepares everything else; the same on any number of threads.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let mut placement = Placement::new(&scene);
+        let owners = Arc::new(OwnerTable::new(&scene, &placement));
+        placement.measure_areas(&scene, &owners);
+        let emitters = Arc::new(Emitters::new(&scene));
+        let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
+        Self { scene, placement: Arc::new(placement), owners, emitters, tracer }
+    }
+
+    /// A ledger with an empty pool.
+    pub fn ledger(&self) -> Ledger {
+        Ledger::new(&self.scene, Arc::clone(&self.emitters), self.placement.vsls.len())
+    }
+
+    /// Traces `tasks` tasks, or until there is nothing left to trace, on the present rayon pool.
+    pub fn advance(&self, ledger: &mut Ledger, tasks: u64) {
+        const BLOCK: u64 = 64;
+        let mut left = tasks;
+        loop {
+            let block: Vec<_> =
+                std::iter::from_fn(|| ledger.next_task()).take(left.min(BLOCK) as usize).collect();
+            if block.is_empty() {
+                return;
+            }
+            left -= block.len() as u64;
+            let batches: Vec<PathBatch> = block
+                .par_iter()
+                .map(|task| {
+                    let mut batch = PathBatch::default();
+                    self.tracer.trace(task.first_slot, task.count, task.generation, &mut batch);
+                    batch
+                })
+                .collect();
+            for (task, batch) in block.into_iter().zip(batches) {
+                ledger.apply(task, batch, 0);
+            }
+        }
+    }
+
+    /// The ledger after every slot has been traced once.
+    pub fn fill(&self) -> Ledger {
+        let mut ledger = self.ledger();
+        let slots = u64::from(self.emitters.slots);
+        let runs: u64 = self
+            .emitters
+            .lights
+            .iter()
+            .map(|l| {
+                u64::from(l.slots.end - l.slots.start).div_ceil(u64::from(crate::ledger::PATHS_PER_TASK))
+            })
+            .sum();
+        debug_assert!(runs <= slots);
+        self.advance(&mut ledger, runs);
+        ledger
+    }
+}
