@@ -1,0 +1,144 @@
+//! The service as a whole: actors, shared memory and control socket within one process.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use photonstream_protocol::{
+    AccessMode, ChannelName, ControlClient, Reading, Reply, Request, Subscriber, VslFrame,
+};
+use photonstream_simulator::{
+    service::{self, Ending, Options, Summary},
+    simulation::Simulation,
+};
+use std::{sync::Arc, thread::JoinHandle, time::Duration};
+
+struct Service {
+    channel: ChannelName,
+    stop: flume::Sender<()>,
+    thread: JoinHandle<Summary>,
+}
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn start(name: &str, simulation: &Simulation, threads: usize, after_paths: Option<u64>) -> Service {
+    let channel: ChannelName = format!("t{}-{name}", std::process::id()).parse().unwrap();
+    let (stop, stopped) = flume::bounded(1);
+    let options = Options { channel: channel.clone(), threads: Some(threads), after_paths };
+    let simulation = simulation.clone();
+    let thread = std::thread::spawn(move || service::run(simulation, &options, &stopped).unwrap());
+    Service { channel, stop, thread }
+}
+
+impl Service {
+    fn attach(&self) -> Subscriber {
+        Subscriber::attach_wait(&self.channel, AccessMode::Mapped, PATIENCE, &|| false).unwrap()
+    }
+
+    fn connect(&self) -> ControlClient {
+        drop(self.attach());
+        ControlClient::connect(&self.channel).unwrap()
+    }
+
+    fn end(self) -> Summary {
+        self.stop.send(()).unwrap();
+        self.thread.join().unwrap()
+    }
+}
+
+/// The first frame that says that the light has converged.
+fn converged(subscriber: &mut Subscriber) -> VslFrame {
+    let deadline = std::time::Instant::now() + PATIENCE;
+    while std::time::Instant::now() < deadline {
+        if subscriber.read().unwrap() == Reading::New && subscriber.frame().unwrap().statistics.converged == 1
+        {
+            return subscriber.frame().unwrap().clone();
+        }
+        subscriber.wait(Duration::from_millis(50));
+    }
+    panic!("no converged frame within {PATIENCE:?}");
+}
+
+fn room(sampling: &str) -> Simulation {
+    let streaming =
+        format!("vsls = 300\npool_paths = 30000\nsampling = \"{sampling}\"\npublish_period_ms = 1");
+    Simulation::new(Arc::new(support::closed_box(0.7, 10.0, &streaming)))
+}
+
+/// Published flux is that of the pool traced in this process, bit for bit, with 1 and 3 tracers, replayed and fresh.
+#[test]
+fn frames_hold_the_same_flux_on_any_number_of_threads() {
+    for (sampling, paths) in [("replay", None), ("fresh", Some(70_000))] {
+        let simulation = room(sampling);
+        let mut ledger = simulation.ledger();
+        let tasks = paths.map_or(u64::MAX, |_| {
+            // As many tasks as hold the paths: the last of each round is short.
+            let (mut given, mut tasks) = (0, 0);
+            let mut counting = simulation.ledger();
+            while given < paths.unwrap() {
+                given += u64::from(counting.next_task().unwrap().count);
+                tasks += 1;
+            }
+            tasks
+        });
+        simulation.advance(&mut ledger, tasks);
+        let expected: Vec<[f32; 3]> = ledger.readings(&simulation.scene).map(|r| r.flux.to_array()).collect();
+        for threads in [1, 3] {
+            let service = start(&format!("{sampling}{threads}"), &simulation, threads, paths);
+            let frame = converged(&mut service.attach());
+            let flux: Vec<[f32; 3]> = frame.vsls.iter().map(|v| v.flux).collect();
+            assert!(flux == expected, "{sampling} on {threads} threads");
+            assert_eq!(frame.scene_hash, simulation.scene.hash);
+            assert_eq!(&*frame.scene_text, &*simulation.scene.resolved_text);
+            assert_eq!(frame.lights.len(), 1);
+            assert_eq!(frame.statistics.paths_total, ledger.counters().paths);
+            let summary = service.end();
+            assert_eq!((summary.ending, summary.counters), (Ending::Stopped, ledger.counters()));
+        }
+    }
+}
+
+#[test]
+fn the_control_socket_pauses_steps_resumes_tells_and_ends() {
+    let service = start("control", &room("fresh"), 2, None);
+    let mut client = service.connect();
+    let mut ask = |request: &Request| client.request(request, Duration::from_secs(20)).unwrap();
+    let paths = |reply: Reply| match reply {
+        Reply::State { state } => (state["paths"].as_u64().unwrap(), state["paused"].as_bool().unwrap()),
+        other => panic!("{other:?}"),
+    };
+    assert!(matches!(ask(&Request::Pause), Reply::Ok { .. }));
+    // What is in flight still arrives; then the number stands.
+    let mut before = paths(ask(&Request::Query));
+    loop {
+        std::thread::sleep(Duration::from_millis(100));
+        let now = paths(ask(&Request::Query));
+        if now == before {
+            break;
+        }
+        before = now;
+    }
+    assert!(before.1);
+    assert!(matches!(ask(&Request::Step), Reply::Ok { .. }));
+    std::thread::sleep(Duration::from_millis(500));
+    let stepped = paths(ask(&Request::Query));
+    assert!(stepped.0 > before.0 && stepped.1);
+    assert!(matches!(ask(&Request::Resume), Reply::Ok { .. }));
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(paths(ask(&Request::Query)).0 > stepped.0);
+    assert!(matches!(ask(&Request::Reload), Reply::Error { .. }));
+    assert!(matches!(ask(&Request::Shutdown), Reply::Ok { .. }));
+    assert_eq!(service.thread.join().unwrap().ending, Ending::Shutdown);
+}
+
+/// A still scene converges, publishes that, and then does nothing: no frame and no path for a second.
+#[test]
+fn a_converged_scene_rests() {
+    let service = start("rest", &room("replay"), 2, None);
+    let mut subscriber = service.attach();
+    let frame = converged(&mut subscriber);
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(subscriber.read().unwrap(), Reading::Unchanged);
+    assert_eq!(subscriber.frame().unwrap().statistics.paths_total, frame.statistics.paths_total);
+    assert_eq!(frame.statistics.pool_valid, frame.statistics.pool_paths);
+    service.end();
+}
