@@ -6,8 +6,6 @@
 //! `PHOTONSTREAM_SOUP=DIR` also writes each scene as a triangle soup (u32 count, 9 f32 per triangle) for other tracers.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
-#[cfg(scratch)]
-use bvhdev::bvh::{Ray, SceneBvh};
 use glam::{Vec3, Vec3A, vec3};
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::CwBvh;
@@ -15,11 +13,10 @@ use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
-#[cfg(not(scratch))]
 use photonstream_scene::bvh::{Ray, SceneBvh};
 use std::time::{Duration, Instant};
 
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 7;
 
 fn main() {
     let (vertices, triangles) = cornell_like_box();

@@ -46,6 +46,9 @@ pub(super) trait Lanes: Copy {
     fn bits(self, mask: Self::M) -> u32;
     /// Distance to a slab plane; may be fused, as box tests need only be conservative.
     fn slab(self, plane: Self::F, slab: &Slab<Self::F>) -> Self::F;
+    /// Where `max(near…, 0)` ≤ `min(far…)`, and that maximum.
+    fn overlap(self, near: [Self::F; 3], far: [Self::F; 3], t_max: Self::F) -> (Self::M, Self::F);
+    fn store(self, value: Self::F) -> F32x8;
     /// The masked children and their entry distances (rounded down by up to 7 ulps), farthest first, the rest after.
     /// `near` is not negative in masked lanes.
     fn order(self, mask: Self::M, near: Self::F, children: &U32x8) -> (U32x8, F32x8);
@@ -119,6 +122,16 @@ impl Lanes for Portable {
     #[inline(always)]
     fn slab(self, plane: F32x8, slab: &Slab<F32x8>) -> F32x8 {
         self.mul(self.sub(plane, slab.origin), slab.inverse)
+    }
+    #[inline(always)]
+    fn overlap(self, near: [F32x8; 3], far: [F32x8; 3], t_max: F32x8) -> (U32x8, F32x8) {
+        let entry = self.max(self.max(near[0], near[1]), self.max(near[2], self.splat(0.0)));
+        let exit = self.min(self.min(far[0], far[1]), self.min(far[2], t_max));
+        (self.le(entry, exit), entry)
+    }
+    #[inline(always)]
+    fn store(self, value: F32x8) -> F32x8 {
+        value
     }
     #[inline(always)]
     fn order(self, mask: U32x8, near: F32x8, children: &U32x8) -> (U32x8, F32x8) {

@@ -1,4 +1,4 @@
-//! Turns the eight-lane vocabulary into AVX2 and FMA instructions (and AVX-512VL where the caller enables it).
+//! Turns the eight-lane vocabulary into AVX2 and FMA instructions.
 
 use std::arch::x86_64::{__m256, __m256i};
 
@@ -11,7 +11,7 @@ use super::lanes::{F32x8, Lanes, Slab, U32x8};
 #[derive(Clone, Copy)]
 pub(super) struct Avx2(pub(super) V3);
 
-const ALWAYS_TRUE_LANES: i32 = -1;
+const ALL_BITS: i32 = -1;
 
 impl Avx2 {
     /// One layer of a descending sorting network: lanes set in `KEEP_MAX` take the larger of the pair.
@@ -82,6 +82,28 @@ impl Lanes for Avx2 {
     fn slab(self, plane: __m256, slab: &Slab<__m256>) -> __m256 {
         self.0.fma._mm256_fmsub_ps(plane, slab.inverse, slab.offset)
     }
+    /// As integers, whose minima and maxima take one cycle instead of four: floats that are not negative order as
+    /// integers; a negative one is below them all, whichever negative one it is. So a negative entry becomes 0, and a
+    /// negative exit remains below every entry.
+    #[inline(always)]
+    fn overlap(self, near: [__m256; 3], far: [__m256; 3], t_max: __m256) -> (__m256, __m256) {
+        let (avx, avx2) = (self.0.avx, self.0.avx2);
+        let entry = avx2._mm256_max_epi32(
+            avx2._mm256_max_epi32(cast(near[0]), cast(near[1])),
+            avx2._mm256_max_epi32(cast(near[2]), avx._mm256_setzero_si256()),
+        );
+        let exit = avx2._mm256_min_epi32(
+            avx2._mm256_min_epi32(cast(far[0]), cast(far[1])),
+            avx2._mm256_min_epi32(cast(far[2]), cast(t_max)),
+        );
+        let apart = avx2._mm256_cmpgt_epi32(entry, exit);
+        let all = avx._mm256_set1_epi32(ALL_BITS);
+        (cast(avx2._mm256_xor_si256(apart, all)), cast(entry))
+    }
+    #[inline(always)]
+    fn store(self, value: __m256) -> F32x8 {
+        cast(value)
+    }
     #[inline(always)]
     fn order(self, mask: __m256, near: __m256, children: &U32x8) -> (U32x8, F32x8) {
         let (avx, avx2) = (self.0.avx, self.0.avx2);
@@ -89,7 +111,7 @@ impl Lanes for Avx2 {
         let lane: __m256i = cast([0u32, 1, 2, 3, 4, 5, 6, 7]);
         let distance_bits = avx._mm256_set1_epi32(0x7fff_fff8);
         let keys = avx2._mm256_or_si256(avx2._mm256_and_si256(cast(near), distance_bits), lane);
-        let none = avx._mm256_set1_epi32(ALWAYS_TRUE_LANES);
+        let none = avx._mm256_set1_epi32(ALL_BITS);
         let keys: __m256i = cast(avx._mm256_blendv_ps(cast(none), cast(keys), mask));
         let keys = self.sort_descending(keys);
         let refs = avx2._mm256_permutevar8x32_epi32(cast(*children), keys);

@@ -10,9 +10,13 @@ mod node;
 mod part;
 mod ray_frame;
 mod scene_bvh;
+mod split;
 mod triangle;
 mod validate;
 mod walk;
+
+#[cfg(test)]
+mod tests;
 
 use glam::Vec3;
 

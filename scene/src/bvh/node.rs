@@ -39,7 +39,6 @@ pub(super) struct SlabLanes<L: Lanes> {
     far: [Slab<L::F>; 3],
     /// Row of the near plane by axis: 0 lower, 1 upper.
     near_row: [usize; 3],
-    zero: L::F,
 }
 
 impl<L: Lanes> SlabLanes<L> {
@@ -51,7 +50,6 @@ impl<L: Lanes> SlabLanes<L> {
             near: [slab(l, near[0], x), slab(l, near[1], y), slab(l, near[2], z)],
             far: [slab(l, far[0], x), slab(l, far[1], y), slab(l, far[2], z)],
             near_row: [usize::from(x < 0.0), usize::from(y < 0.0), usize::from(z < 0.0)],
-            zero: l.splat(0.0),
         }
     }
 
@@ -66,9 +64,7 @@ impl<L: Lanes> SlabLanes<L> {
         let far_x = l.slab(l.load(&x[i ^ 1]), &self.far[0]);
         let far_y = l.slab(l.load(&y[j ^ 1]), &self.far[1]);
         let far_z = l.slab(l.load(&z[k ^ 1]), &self.far[2]);
-        let entry = l.max(l.max(near_x, near_y), l.max(near_z, self.zero));
-        let exit = l.min(l.min(far_x, far_y), l.min(far_z, l.splat(t_max)));
-        (l.le(entry, exit), entry)
+        l.overlap([near_x, near_y, near_z], [far_x, far_y, far_z], l.splat(t_max))
     }
 }
 

@@ -3,19 +3,23 @@
 use std::ops::Range;
 
 use glam::{Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::collapse::collapse;
 use super::lanes::WIDTH;
 use super::node::{NONE, Node};
+use super::split::split;
 use super::triangle::{Packet, is_solid};
 
-/// Above this number of triangles building saves time at the price of a few per cent of ray speed.
-const FAST_BUILD_FROM: usize = 2_000_000;
+/// Part of the nodes that the first pass of reinsertion considers.
+const REINSERTED: f32 = 0.2;
+/// Reinsertion is left out if more than one node in this many has two children of its own size.
+const STACKED_PART: usize = 32;
+/// Up to this number of triangles both ways of building are tried.
+const CLUSTERED_UP_TO: usize = 1_000_000;
 
 /// The ray-tracing structure of one part: world-space triangles under eight-wide nodes.
 #[derive(Clone, Debug)]
@@ -74,23 +78,44 @@ impl Bvh {
     }
 }
 
-/// A binary tree with one box per leaf, by locally ordered clustering and reinsertion.
+/// A binary tree with one box per leaf: cut from the top, or clustered from below where that comes out cheaper.
+///
+/// Flat, regular geometry (walls) wants cuts, scattered detail wants clusters.
 pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
-    if boxes.is_empty() {
-        return Bvh2::default();
+    let mut cut = split(boxes);
+    improve(&mut cut);
+    if boxes.len() > CLUSTERED_UP_TO || boxes.len() < 2 {
+        return cut;
     }
-    let params = if boxes.len() < FAST_BUILD_FROM {
-        BvhBuildParams::slow_build()
-    } else {
-        BvhBuildParams::fast_build()
-    };
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        params.ploc_search_distance,
+    let mut clustered = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocSearchDistance::High,
         boxes,
         (0..boxes.len() as u32).collect(),
-        params.sort_precision,
-        params.search_depth_threshold,
+        SortPrecision::U64,
+        2,
     );
-    ReinsertionOptimizer::default().run(&mut tree, params.reinsertion_batch_ratio, None);
-    tree
+    improve(&mut clustered);
+    if surface_cost(&clustered) < surface_cost(&cut) { clustered } else { cut }
+}
+
+/// Moves subtrees to cheaper places, unless many lie on top of each other: the search for a place could then reject
+/// nothing and would take quadratic time, in vain.
+fn improve(tree: &mut Bvh2) {
+    let area = |node: u32| tree.nodes[node as usize].aabb().half_area();
+    let stacked = tree.nodes.iter().filter(|node| {
+        let (left, right) = (node.first_index, node.first_index + 1);
+        !node.is_leaf()
+            && [left, right]
+                .iter()
+                .all(|&child| !tree.nodes[child as usize].is_leaf() && area(child) >= node.aabb().half_area())
+    });
+    if stacked.count() > tree.nodes.len() / STACKED_PART {
+        return;
+    }
+    ReinsertionOptimizer::default().run(tree, REINSERTED, None);
+}
+
+/// Area of all inner nodes: what a random line pays.
+fn surface_cost(tree: &Bvh2) -> f64 {
+    tree.nodes.iter().filter(|node| !node.is_leaf()).map(|node| f64::from(node.aabb().half_area())).sum()
 }

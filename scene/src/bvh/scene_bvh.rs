@@ -11,6 +11,8 @@ use super::dispatch::{Instructions, Query, detect};
 use super::node::{NONE, Node};
 use super::part::{Bvh, binary_tree};
 use super::ray_frame::RayFrame;
+use super::triangle::Nearest;
+use super::walk::STACK_OF_THREAD;
 use super::{Hit, Ray};
 
 /// Parts under a small top level; a clone shares the parts.
@@ -86,7 +88,7 @@ impl SceneBvh {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let frame = RayFrame::new(ray, self.lo, self.hi)?;
-        let nearest = self.instructions.run(Query::<false> { scene: self, frame: &frame });
+        let nearest = self.run::<false>(&frame);
         nearest.found.then(|| Hit {
             t: nearest.t * frame.t_scale,
             u: nearest.u,
@@ -98,8 +100,13 @@ impl SceneBvh {
     /// Whether anything is hit at all; the same as `closest(ray).is_some()`, and faster.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        RayFrame::new(ray, self.lo, self.hi)
-            .is_some_and(|frame| self.instructions.run(Query::<true> { scene: self, frame: &frame }).found)
+        RayFrame::new(ray, self.lo, self.hi).is_some_and(|frame| self.run::<true>(&frame).found)
+    }
+
+    #[inline]
+    fn run<const ANY: bool>(&self, frame: &RayFrame) -> Nearest {
+        STACK_OF_THREAD
+            .with_borrow_mut(|stack| self.instructions.run(Query::<ANY> { scene: self, frame, stack }))
     }
 
     /// Lower and upper corner of all triangles that can be hit; twice the origin if there are none.
@@ -117,7 +124,7 @@ impl SceneBvh {
         self.parts().map(|bvh| bvh.ignored as usize).sum()
     }
 
-    /// Instruction set in use: `"avx512"`, `"avx2"` or `"portable"`.
+    /// Instruction set in use: `"avx2"` (with FMA) or `"portable"`.
     pub fn instruction_set(&self) -> &'static str {
         self.instructions.name()
     }

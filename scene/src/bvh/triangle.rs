@@ -30,7 +30,12 @@ impl Packet {
 
     #[inline(always)]
     pub(super) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.vertices.map(|rows| rows.map(|row| row.0[lane]))
+        let [a, b, c] = &self.vertices;
+        [
+            [a[0].0[lane], a[1].0[lane], a[2].0[lane]],
+            [b[0].0[lane], b[1].0[lane], b[2].0[lane]],
+            [c[0].0[lane], c[1].0[lane], c[2].0[lane]],
+        ]
     }
 }
 
@@ -135,41 +140,79 @@ fn edge<L: Lanes>(l: L, p: [L::F; 2], q: [L::F; 2]) -> L::F {
 /// clamped to the triangle's own padded box, which makes culling by any enclosing box exact (see the module's notes).
 #[inline(always)]
 pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32; 3]> {
-    let [kx, ky, kz] = frame.axis;
-    let [a, b, c] = triangle.map(|vertex| {
-        let z = vertex[kz] - frame.origin[kz];
-        let x = vertex[kx] - frame.origin[kx];
-        let y = vertex[ky] - frame.origin[ky];
-        let sheared = [x - frame.shear[0] * z, y - frame.shear[1] * z];
-        ([x, y, z], sheared.map(f64::from))
-    });
-    let edge = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
-    let (u, v, w) = (edge(c.1, b.1), edge(a.1, c.1), edge(b.1, a.1));
+    let (a, b, c) = (
+        Sheared::new(frame, &triangle[0]),
+        Sheared::new(frame, &triangle[1]),
+        Sheared::new(frame, &triangle[2]),
+    );
+    let (u, v, w) = (exact_edge(&c, &b), exact_edge(&a, &c), exact_edge(&b, &a));
     let agree = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
     let determinant = u + v + w;
     if !agree || determinant == 0.0 {
         return None;
     }
     let inverse = 1.0 / determinant;
-    let z = u * f64::from(a.0[2]) + v * f64::from(b.0[2]) + w * f64::from(c.0[2]);
+    let z = u * f64::from(a.moved[2]) + v * f64::from(b.moved[2]) + w * f64::from(c.moved[2]);
     let t = (z * inverse * frame.inverse_z) as f32;
 
-    let mut near = f32::NEG_INFINITY;
-    let mut far = f32::INFINITY;
-    let extent = |i: usize| {
-        let low = a.0[i].min(b.0[i]).min(c.0[i]);
-        let high = a.0[i].max(b.0[i]).max(c.0[i]);
-        (low, high)
-    };
-    let extents = [extent(0), extent(1), extent(2)];
-    let reach = extents.iter().fold(0.0f32, |reach, (low, high)| reach.max(-low).max(*high));
+    let (low_x, high_x) = extent(a.moved[0], b.moved[0], c.moved[0]);
+    let (low_y, high_y) = extent(a.moved[1], b.moved[1], c.moved[1]);
+    let (low_z, high_z) = extent(a.moved[2], b.moved[2], c.moved[2]);
+    let reach = larger(larger(larger(-low_x, high_x), larger(-low_y, high_y)), larger(-low_z, high_z));
     let pad = reach * TRIANGLE_PAD;
-    for (i, (low, high)) in extents.into_iter().enumerate() {
-        let inverse = frame.inverse[frame.axis[i]];
-        let (p, q) = ((low - pad) * inverse, (high + pad) * inverse);
-        near = near.max(p.min(q));
-        far = far.min(p.max(q));
+    let [kx, ky, kz] = frame.axis;
+    let (near_x, far_x) = interval(low_x - pad, high_x + pad, frame.inverse[kx]);
+    let (near_y, far_y) = interval(low_y - pad, high_y + pad, frame.inverse[ky]);
+    let (near_z, far_z) = interval(low_z - pad, high_z + pad, frame.inverse[kz]);
+    let near = larger(larger(near_x, near_y), near_z);
+    let far = smaller(smaller(far_x, far_y), far_z);
+    let t = smaller(larger(t, near), far);
+    (near <= far && t > 0.0).then_some([t, (v * inverse) as f32, (w * inverse) as f32])
+}
+
+/// A vertex translated to the ray's origin (axes permuted), and sheared as in the filter.
+struct Sheared {
+    moved: [f32; 3],
+    x: f64,
+    y: f64,
+}
+
+impl Sheared {
+    #[inline(always)]
+    fn new(frame: &RayFrame, vertex: &[f32; 3]) -> Self {
+        let [kx, ky, kz] = frame.axis;
+        let x = vertex[kx] - frame.origin[kx];
+        let y = vertex[ky] - frame.origin[ky];
+        let z = vertex[kz] - frame.origin[kz];
+        Self { moved: [x, y, z], x: f64::from(x - frame.shear[0] * z), y: f64::from(y - frame.shear[1] * z) }
     }
-    let t = t.max(near).min(far);
-    (near <= far && t > 0.0).then(|| [t, (v * inverse) as f32, (w * inverse) as f32])
+}
+
+#[inline(always)]
+fn exact_edge(p: &Sheared, q: &Sheared) -> f64 {
+    p.x * q.y - p.y * q.x
+}
+
+#[inline(always)]
+fn extent(a: f32, b: f32, c: f32) -> (f32, f32) {
+    (smaller(smaller(a, b), c), larger(larger(a, b), c))
+}
+
+/// Distances to two planes, near one first.
+#[inline(always)]
+fn interval(low: f32, high: f32, inverse: f32) -> (f32, f32) {
+    let (p, q) = (low * inverse, high * inverse);
+    if inverse < 0.0 { (q, p) } else { (p, q) }
+}
+
+/// The smaller of two numbers that are not NaN, in one instruction.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers that are not NaN, in one instruction.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
