@@ -113,6 +113,14 @@ impl Claim {
     }
 }
 
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // Closing is not enough: a child process that is just being started holds a copy until it runs its program.
+        // Where unlocking fails, closing still unlocks.
+        let _ = self.lock.unlock();
+    }
+}
+
 /// Who holds or last held a channel's lock.
 pub(crate) fn holder(dir: &ChannelDir) -> Option<Holder> {
     toml::from_str(&dir.read_small("lock").ok()??).ok()

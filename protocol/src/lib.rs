@@ -22,6 +22,8 @@ mod process;
 mod publisher;
 mod reader_segment;
 mod record;
+#[cfg(test)]
+mod ring_loom;
 mod ring_read;
 mod ring_write;
 mod runtime;

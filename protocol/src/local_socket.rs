@@ -23,6 +23,36 @@ pub(crate) fn connect_now(path: &Path) -> Result<UnixStream, ProtocolError> {
     Ok(stream)
 }
 
+/// A connection whose only purpose is that the system ends it with the simulator's process.
+pub(crate) struct Lifeline {
+    stream: Option<UnixStream>,
+    /// The socket was there and nobody listened: its process has probably ended.
+    refused: bool,
+}
+
+impl Lifeline {
+    /// Connects, if there is something to connect to.
+    pub(crate) fn connect(path: &Path) -> Self {
+        match connect_now(path) {
+            Ok(stream) => Self { stream: Some(stream), refused: false },
+            Err(ProtocolError::Io { source, .. }) => {
+                Self { stream: None, refused: source.kind() == ErrorKind::ConnectionRefused }
+            }
+            Err(_) => Self { stream: None, refused: false },
+        }
+    }
+
+    /// Whether there is reason to ask if the process still runs: the other end closed, or nobody listened.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.refused || self.stream.as_ref().is_some_and(is_closed)
+    }
+
+    /// Whether there is a connection, or was one.
+    pub(crate) fn is_connected(&self) -> bool {
+        self.stream.is_some()
+    }
+}
+
 /// Whether the other end has closed; looks, and takes nothing.
 pub(crate) fn is_closed(stream: &UnixStream) -> bool {
     let mut byte = [0u8; 1];

@@ -1,13 +1,12 @@
 //! Turns a channel into the newest whole frame, whatever happens to the simulator behind it.
 
-use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use crate::chunks::ChunkSet;
 use crate::error::ProtocolError;
 use crate::frame::{FramePair, VslFrame};
 use crate::layout::{state, word};
-use crate::local_socket::{SOCKET, connect_now, is_closed};
+use crate::local_socket::{Lifeline, SOCKET};
 use crate::process::monotonic_ns;
 use crate::reader_segment::{AccessMode, ReaderSegment, Words};
 use crate::ring_read::{Head, Outcome, RingReader};
@@ -80,7 +79,7 @@ pub struct Subscriber {
     frames: FramePair,
     changed: ChunkSet,
     head: Head,
-    lifeline: Option<UnixStream>,
+    lifeline: Lifeline,
     last_look: Instant,
     last_connect: Instant,
     last_state: u8,
@@ -119,7 +118,7 @@ impl Subscriber {
         let segment = open_current(&dir, mode)?;
         Ok(Self {
             reader: RingReader::new(segment.layout.shape.clone()),
-            lifeline: connect_now(&dir.file(SOCKET)).ok(),
+            lifeline: Lifeline::connect(&dir.file(SOCKET)),
             dir,
             mode,
             segment,
@@ -220,7 +219,7 @@ impl Subscriber {
         }
         let writer = self.segment.layout.writer;
         let age = Duration::from_nanos(monotonic_ns().saturating_sub(load(word::HEARTBEAT)));
-        if self.lifeline.as_ref().is_some_and(is_closed) && !writer.is_alive() {
+        if self.lifeline.is_cut() && !writer.is_alive() {
             let reason = format!("process {} closed its control socket and ended", writer.pid);
             return Liveness::Gone { reason };
         }
@@ -305,7 +304,7 @@ impl Subscriber {
                 self.reader = RingReader::new(next.layout.shape.clone());
                 self.segment = next;
                 self.frames.forget_versions();
-                self.lifeline = connect_now(&self.dir.file(SOCKET)).ok();
+                self.lifeline = Lifeline::connect(&self.dir.file(SOCKET));
                 Ok(true)
             }
             Err(error) if is_transient(&error) => Ok(false),
@@ -315,13 +314,10 @@ impl Subscriber {
 
     /// Connects to a control socket that appeared after this reader, or that had turned it away.
     fn keep_lifeline(&mut self) {
-        let refused = self.lifeline.as_ref().is_some_and(is_closed) && self.segment.layout.writer.is_alive();
-        if refused {
-            self.lifeline = None;
-        }
-        if self.lifeline.is_none() && self.last_connect.elapsed() >= RECONNECT {
+        let useless = !self.lifeline.is_connected() || self.lifeline.is_cut();
+        if useless && self.last_connect.elapsed() >= RECONNECT {
             self.last_connect = Instant::now();
-            self.lifeline = connect_now(&self.dir.file(SOCKET)).ok();
+            self.lifeline = Lifeline::connect(&self.dir.file(SOCKET));
         }
     }
 
@@ -329,7 +325,7 @@ impl Subscriber {
         let load = |at| self.segment.load(at).unwrap_or(0);
         load(word::STATE) != state::LIVE
             || monotonic_ns().saturating_sub(load(word::HEARTBEAT)) > STALE_AFTER.as_nanos() as u64
-            || self.lifeline.as_ref().is_some_and(is_closed)
+            || self.lifeline.is_cut()
     }
 }
 
