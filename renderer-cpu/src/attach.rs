@@ -1,0 +1,211 @@
+//! Turns the frames of a channel into picture files: the renderer process.
+
+use crate::{
+    RenderError, RenderStats, Rendered, VslSet, Watch, cli::Args, published::PublishedScene, render,
+};
+use photonstream_film::Film;
+use photonstream_protocol::{AccessMode, Liveness, ProtocolError, Reading, Subscriber, VslFrame};
+use photonstream_scene::RenderSettings;
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
+
+/// What a run of the renderer has done.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Pictures written.
+    pub pictures: u32,
+    /// The frame of the last one.
+    pub last_frame: Option<u64>,
+    /// Why it ended.
+    pub ended: Ended,
+}
+
+/// Why a run of the renderer has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// All pictures asked for are written.
+    Done,
+    /// The simulator closed the channel for good; its last frame is written.
+    ChannelClosed,
+    /// Somebody asked to stop.
+    Cancelled,
+}
+
+/// A picture that has just been written.
+#[derive(Clone, Copy, Debug)]
+pub struct Written<'a> {
+    /// Its number, from 1.
+    pub number: u32,
+    /// The published frame that it shows.
+    pub frame: u64,
+    /// Its files, the EXR first.
+    pub files: &'a [PathBuf],
+    /// What it took.
+    pub stats: &'a RenderStats,
+}
+
+/// Attaches to the channel that `args` name, waits for it where needed, and writes pictures until there are enough,
+/// the simulator closes the channel, or `cancelled` is set.
+///
+/// A simulator that dies leaves its last frame; the renderer waits for the next one and follows it. With `--frames`,
+/// once the light has converged and no newer frame comes, the remaining pictures repeat the last one.
+///
+/// # Errors
+/// [`RenderError`]: an option out of range, a scene that cannot be loaded, a file that cannot be written, a channel
+/// that is insecure or of another release.
+pub fn run(
+    args: &Args,
+    cancelled: &AtomicBool,
+    written: &mut dyn FnMut(&Written<'_>),
+) -> Result<Report, RenderError> {
+    let stop = || cancelled.load(Ordering::Relaxed);
+    let mut run = Run { args, cancelled, written, scene: PublishedScene::default(), pictures: 0, last: None };
+    let Some(mut subscriber) = attach(args, &stop)? else { return Ok(run.report(Ended::Cancelled)) };
+    let mut told = None;
+    let mut pending = false;
+    let mut newest = Instant::now();
+    loop {
+        if stop() {
+            return Ok(run.report(Ended::Cancelled));
+        }
+        // Asked before reading: what was published before the channel was closed is then read.
+        let liveness = subscriber.liveness();
+        match subscriber.read() {
+            Ok(Reading::New) => (pending, newest) = (true, Instant::now()),
+            Ok(_) => {}
+            Err(error) => tell(&mut told, format!("{error}; the last frame is kept")),
+        }
+        tell_liveness(&mut told, args, &liveness);
+        let closed = liveness == Liveness::Retired;
+        if let Some(frame) = subscriber.frame() {
+            let converged = frame.statistics.converged != 0;
+            let due = if args.frames.is_some() { pending } else { converged || closed };
+            if due {
+                match run.picture(frame) {
+                    Err(RenderError::Cancelled) => return Ok(run.report(Ended::Cancelled)),
+                    result => result?,
+                }
+                pending = false;
+            } else if run.last.is_some() && converged && newest.elapsed() > QUIET {
+                run.repeat()?;
+            }
+        }
+        if run.pictures >= args.frames.unwrap_or(1) {
+            return Ok(run.report(Ended::Done));
+        }
+        if closed {
+            return Ok(run.report(Ended::ChannelClosed));
+        }
+        subscriber.wait(Duration::from_millis(100));
+    }
+}
+
+/// So long without a newer frame, a converged light is taken to be at rest.
+const QUIET: Duration = Duration::from_millis(500);
+
+fn attach(args: &Args, stop: &dyn Fn() -> bool) -> Result<Option<Subscriber>, RenderError> {
+    match Subscriber::attach(&args.channel, AccessMode::Mapped) {
+        Ok(subscriber) => return Ok(Some(subscriber)),
+        Err(error) => tracing::info!("{error}; waiting for it"),
+    }
+    // As long as it takes; insecure folders, another release and the like end the wait at once.
+    let forever = Duration::from_secs(10 * 365 * 24 * 3600);
+    match Subscriber::attach_wait(&args.channel, AccessMode::Mapped, forever, stop) {
+        Ok(subscriber) => Ok(Some(subscriber)),
+        Err(ProtocolError::Cancelled { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Logs `message` unless it was the last one.
+fn tell(told: &mut Option<String>, message: String) {
+    if told.as_ref() != Some(&message) {
+        tracing::warn!("{message}");
+        *told = Some(message);
+    }
+}
+
+fn tell_liveness(told: &mut Option<String>, args: &Args, liveness: &Liveness) {
+    let channel = &args.channel;
+    match liveness {
+        Liveness::Gone { .. } => {
+            tell(told, format!("channel {channel}: the simulator has ended; keeping its last frame, waiting for the next run"));
+        }
+        Liveness::Stalled { .. } => {
+            tell(told, format!("channel {channel}: the simulator does not respond; keeping its last frame"));
+        }
+        Liveness::Live | Liveness::Paused | Liveness::Retired => {}
+    }
+}
+
+struct Run<'a> {
+    args: &'a Args,
+    cancelled: &'a AtomicBool,
+    written: &'a mut dyn FnMut(&Written<'_>),
+    scene: PublishedScene,
+    pictures: u32,
+    last: Option<Last>,
+}
+
+/// The last picture.
+struct Last {
+    frame: u64,
+    rendered: Rendered,
+    settings: RenderSettings,
+}
+
+impl Run<'_> {
+    fn report(&self, ended: Ended) -> Report {
+        Report { pictures: self.pictures, last_frame: self.last.as_ref().map(|l| l.frame), ended }
+    }
+
+    fn picture(&mut self, frame: &VslFrame) -> Result<(), RenderError> {
+        let scene = self.scene.update(frame)?;
+        let vsls = VslSet::from_records(&frame.vsls)?;
+        let watch = Watch { progress: None, cancelled: Some(self.cancelled) };
+        let mut rendered = render(scene, &vsls, &self.args.options(&scene.render), watch)?;
+        rendered.film.metadata.frame = Some(frame.frame);
+        rendered.film.metadata.scene_hash = Some(frame.scene_hash);
+        rendered.film.metadata.photon_paths = Some(frame.statistics.pool_valid);
+        let settings = scene.render.clone();
+        self.write(Last { frame: frame.frame, rendered, settings })
+    }
+
+    fn repeat(&mut self) -> Result<(), RenderError> {
+        match self.last.take() {
+            Some(last) => self.write(last),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&mut self, last: Last) -> Result<(), RenderError> {
+        let number = self.pictures + 1;
+        let files = write_files(self.args, number, &last.rendered.film, &last.settings)?;
+        self.pictures = number;
+        (self.written)(&Written { number, frame: last.frame, files: &files, stats: &last.rendered.stats });
+        self.last = Some(last);
+        Ok(())
+    }
+}
+
+/// Writes all layers as one EXR, and each as a PNG; the first PNG has the plain name, others that of their layer.
+fn write_files(
+    args: &Args,
+    number: u32,
+    film: &Film,
+    settings: &RenderSettings,
+) -> Result<Vec<PathBuf>, RenderError> {
+    let exr = args.out.join(format!("frame-{number:04}.exr"));
+    film.write_exr(&exr)?;
+    let mut files = vec![exr];
+    for (index, kind) in args.show.iter().enumerate() {
+        let suffix = if index == 0 { String::new() } else { format!("-{kind}") };
+        let png = args.out.join(format!("frame-{number:04}{suffix}.png"));
+        film.write_png(&png, kind.name(), kind.display(settings))?;
+        files.push(png);
+    }
+    Ok(files)
+}

@@ -1,0 +1,79 @@
+//! Gathers what can go wrong while a picture is rendered.
+
+use photonstream_film::FilmError;
+use photonstream_protocol::ProtocolError;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// The picture's size, a layer's name, or writing the file.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// The channel.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
+    /// An option is out of its range.
+    #[error("{option}: found {found}, expected {expected}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// What was given.
+        found: String,
+        /// What is possible.
+        expected: &'static str,
+    },
+    /// A virtual surface light is unusable.
+    #[error(
+        "virtual surface light {index}: {field}: found {found}, expected {expected}; simulator and renderer differ, \
+         restart both"
+    )]
+    Vsl {
+        /// Its index.
+        index: usize,
+        /// The field.
+        field: &'static str,
+        /// What was found.
+        found: String,
+        /// What is possible.
+        expected: &'static str,
+    },
+    /// A published light is unusable.
+    #[error("light {index}: {field}: found {found}, expected {expected}; simulator and renderer differ, restart both")]
+    Light {
+        /// Its index.
+        index: usize,
+        /// The field.
+        field: &'static str,
+        /// What was found.
+        found: String,
+        /// What is possible.
+        expected: &'static str,
+    },
+    /// The published scene is not the one that its text describes: an object has moved.
+    #[error(
+        "object \"{object}\" has moved since the scene was published, which this renderer does not follow yet; \
+         restart the simulator to render it in its new place"
+    )]
+    Moved {
+        /// The object's name.
+        object: String,
+    },
+    /// The published scene text could not be loaded.
+    #[error("the published scene cannot be loaded: {reason}")]
+    Scene {
+        /// What the scene loader said.
+        reason: String,
+    },
+    /// Somebody asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// The threads could not be started.
+    #[error("{threads} render threads cannot be started: {reason}; choose fewer with --threads")]
+    Threads {
+        /// Number asked for.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+}

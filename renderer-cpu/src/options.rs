@@ -1,0 +1,73 @@
+//! Gathers what a picture of virtual surface lights shall be like.
+
+use crate::{LayerKind, RenderError};
+use photonstream_scene::{RenderSettings, Visibility};
+use photonstream_shading::Kernel;
+
+/// How [`crate::render`] makes a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Picture width in pixels.
+    pub width: u32,
+    /// Picture height in pixels.
+    pub height: u32,
+    /// How the flux of a virtual surface light falls off.
+    pub kernel: Kernel,
+    /// Whether virtual surface lights are shadowed.
+    pub visibility: Visibility,
+    /// A virtual surface light is skipped where it cannot add this radiance (W m⁻² sr⁻¹); 0: never.
+    pub epsilon: f32,
+    /// Shadow rays per camera sample and area light.
+    pub light_samples: u32,
+    /// What is rendered, in this order; the first is what a viewer shows.
+    pub layers: Vec<LayerKind>,
+    /// Camera samples per pixel: 1 is the pixel's centre, more are stratified over it.
+    pub samples_per_pixel: u32,
+    /// Seed of pixel and area-light samples.
+    pub seed: u64,
+    /// Threads; `None`: one per core. The picture does not depend on it.
+    pub threads: Option<usize>,
+}
+
+impl RenderOptions {
+    /// The settings that a scene asks for; the full picture, one sample per pixel.
+    pub fn from_settings(settings: &RenderSettings) -> Self {
+        Self {
+            width: settings.width,
+            height: settings.height,
+            kernel: settings.kernel,
+            visibility: settings.visibility,
+            epsilon: settings.epsilon,
+            light_samples: settings.light_samples,
+            layers: vec![LayerKind::Full],
+            samples_per_pixel: 1,
+            seed: 1,
+            threads: None,
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), RenderError> {
+        let wrong = |option, found: String, expected| Err(RenderError::Option { option, found, expected });
+        if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
+            return wrong("epsilon", self.epsilon.to_string(), "0 or more, finite");
+        }
+        if !(1..=MAX_SAMPLES).contains(&self.light_samples) {
+            return wrong("light_samples", self.light_samples.to_string(), "1 to 65536");
+        }
+        if !(1..=MAX_SAMPLES).contains(&self.samples_per_pixel) {
+            return wrong("samples per pixel", self.samples_per_pixel.to_string(), "1 to 65536");
+        }
+        let repeats = |(i, layer): (usize, &LayerKind)| self.layers[..i].contains(layer);
+        if self.layers.is_empty() || self.layers.iter().enumerate().any(repeats) {
+            let names: Vec<_> = self.layers.iter().map(|l| l.name()).collect();
+            return wrong("layers", format!("[{}]", names.join(", ")), "one or more, each once");
+        }
+        Ok(())
+    }
+
+    pub(crate) fn needs(&self, what: fn(LayerKind) -> bool) -> bool {
+        self.layers.iter().any(|&layer| what(layer))
+    }
+}
+
+const MAX_SAMPLES: u32 = 1 << 16;

@@ -1,0 +1,286 @@
+//! Turns a scene and its virtual surface lights into a picture: the sum of METHODS §2, tile by tile.
+
+use crate::{
+    InstructionSet, LayerKind, RenderError, RenderOptions, VslSet, Watch,
+    cull::{Culling, Selection},
+    direct, gather,
+    owner::{self, Owners},
+    shadowed,
+    surface::{self, Surface},
+    tile::{TILE_EDGE, Tile},
+    watch::on_threads,
+};
+use core::f32::consts::FRAC_1_PI;
+use glam::Vec3;
+use photonstream_film::Film;
+use photonstream_scene::{Scene, Visibility};
+use photonstream_shading::sobol::Sequence;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::{sync::atomic::AtomicUsize, time::Instant};
+
+/// A picture and what it took.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// The layers asked for, and where they come from.
+    pub film: Film,
+    /// What it took.
+    pub stats: RenderStats,
+}
+
+/// What a picture took. The keys of the serialised form are the fields' names.
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
+pub struct RenderStats {
+    /// Time from call to picture.
+    pub render_ms: f64,
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Shadow rays to lights.
+    pub light_rays: u64,
+    /// Shadow rays to virtual surface lights.
+    pub vsl_rays: u64,
+    /// Number of virtual surface lights.
+    pub vsls: u64,
+    /// What the range of the lights may have lost at most, as a share of the indirect light of the picture: the sum
+    /// of the upper bounds of all that was skipped over the sum of what was found. 0 where nothing was skipped.
+    pub range_loss_share: f64,
+}
+
+impl RenderStats {
+    fn merge(mut self, other: &Self) -> Self {
+        self.camera_rays += other.camera_rays;
+        self.light_rays += other.light_rays;
+        self.vsl_rays += other.vsl_rays;
+        self
+    }
+}
+
+/// Renders `scene` as lit by its lights and by `vsls`.
+///
+/// Lo = Le + ρ/π (E_direct + Σ Φ V cosθ cosθ_s K), METHODS §2. The picture depends on `options` alone, not on the
+/// number of threads.
+///
+/// # Errors
+/// [`RenderError`]: an option out of range, an impossible size, cancelled.
+pub fn render(
+    scene: &Scene,
+    vsls: &VslSet,
+    options: &RenderOptions,
+    watch: Watch<'_>,
+) -> Result<Rendered, RenderError> {
+    render_with(scene, vsls, options, watch, InstructionSet::Detected)
+}
+
+/// [`render`] with a given instruction set; all of them give the same picture.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_with(
+    scene: &Scene,
+    vsls: &VslSet,
+    options: &RenderOptions,
+    watch: Watch<'_>,
+    instructions: InstructionSet,
+) -> Result<Rendered, RenderError> {
+    let start = Instant::now();
+    options.validate()?;
+    let mut film = Film::new(options.width, options.height)?;
+    let frame = Frame::new(scene, vsls, options, instructions);
+    let tiles = on_threads(options.threads, || frame.tiles(watch))?;
+    for (index, &kind) in options.layers.iter().enumerate() {
+        let mut pixels = vec![Vec3::ZERO; film.pixel_count()];
+        for tile in &tiles {
+            for (row, values) in tile.layers[index].chunks_exact(tile.width).enumerate() {
+                let at = (tile.y as usize + row) * options.width as usize + tile.x as usize;
+                pixels[at..at + tile.width].copy_from_slice(values);
+            }
+        }
+        film.push(kind.name(), pixels)?;
+    }
+    let mut stats = tiles.iter().fold(RenderStats::default(), |sum, tile| sum.merge(&tile.stats));
+    // Summed in the order of the tiles: the same on any number of threads.
+    let (skipped, indirect) =
+        tiles.iter().fold((0.0, 0.0), |(s, i), tile| (s + tile.skipped, i + tile.indirect));
+    stats.range_loss_share = if indirect > 0.0 { skipped / indirect } else { 0.0 };
+    stats.vsls = vsls.len() as u64;
+    let metadata = &mut film.metadata;
+    metadata.scene_name = Some(scene.name.clone());
+    metadata.scene_hash = Some(scene.hash);
+    metadata.method = Some("photon-streaming".into());
+    metadata.kernel = Some(options.kernel.name().into());
+    metadata.visibility = Some(options.visibility.name().into());
+    metadata.samples_per_pixel = Some(options.samples_per_pixel.into());
+    metadata.vsls = Some(stats.vsls);
+    metadata.software = Some(SOFTWARE.into());
+    stats.render_ms = start.elapsed().as_secs_f64() * 1e3;
+    Ok(Rendered { film, stats })
+}
+
+pub(crate) const SOFTWARE: &str = concat!("photonstream ", env!("CARGO_PKG_VERSION"));
+
+/// All that the tiles of one picture share.
+struct Frame<'a> {
+    scene: &'a Scene,
+    vsls: &'a VslSet,
+    options: &'a RenderOptions,
+    instructions: InstructionSet,
+    culling: Culling,
+    owners: Option<Owners<'a>>,
+}
+
+/// The pixels of one tile.
+struct TileResult {
+    x: u32,
+    y: u32,
+    width: usize,
+    /// One list of pixels per layer asked for.
+    layers: Vec<Vec<Vec3>>,
+    stats: RenderStats,
+    /// Sum of the upper bounds of what was skipped, in W m⁻² sr⁻¹.
+    skipped: f64,
+    /// Sum of the indirect radiance, largest channel, in W m⁻² sr⁻¹.
+    indirect: f64,
+}
+
+impl<'a> Frame<'a> {
+    fn new(
+        scene: &'a Scene,
+        vsls: &'a VslSet,
+        options: &'a RenderOptions,
+        instructions: InstructionSet,
+    ) -> Self {
+        let albedo_max =
+            scene.objects.iter().map(|o| scene.materials[o.material.0 as usize].albedo.max_element());
+        let (lo, hi) = scene.bvh.bounds();
+        let magnitude = lo.abs().max(hi.abs()).max_element();
+        let culling = Culling {
+            kernel: options.kernel,
+            epsilon: options.epsilon,
+            albedo_max: albedo_max.fold(0.0, f32::max),
+            magnitude: if magnitude.is_finite() { magnitude } else { 0.0 },
+        };
+        let owners = options.needs(LayerKind::needs_owner).then(|| Owners::new(vsls, scene.objects.len()));
+        Self { scene, vsls, options, instructions, culling, owners }
+    }
+
+    fn tiles(&self, watch: Watch<'_>) -> Result<Vec<TileResult>, RenderError> {
+        let columns = self.options.width.div_ceil(TILE_EDGE);
+        let total = columns as usize * self.options.height.div_ceil(TILE_EDGE) as usize;
+        let done = AtomicUsize::new(0);
+        (0..total)
+            .into_par_iter()
+            .map_init(
+                || (Tile::new(), Selection::default()),
+                |(tile, selection), index| {
+                    watch.check()?;
+                    let (x, y) = (index as u32 % columns * TILE_EDGE, index as u32 / columns * TILE_EDGE);
+                    let result = self.tile(x, y, tile, selection);
+                    watch.advance(&done, total);
+                    Ok(result)
+                },
+            )
+            .collect()
+    }
+
+    fn tile(&self, x: u32, y: u32, tile: &mut Tile, selection: &mut Selection) -> TileResult {
+        let width = (self.options.width - x).min(TILE_EDGE) as usize;
+        let height = (self.options.height - y).min(TILE_EDGE) as usize;
+        let count = width * height;
+        let layers = vec![vec![Vec3::ZERO; count]; self.options.layers.len()];
+        let stats = RenderStats::default();
+        let mut result = TileResult { x, y, width, layers, stats, skipped: 0.0, indirect: 0.0 };
+        for sample_index in 0..self.options.samples_per_pixel {
+            let pixel_of = |i: usize| (x + (i % width) as u32, y + (i / width) as u32);
+            tile.fill(count, |i| self.see(pixel_of(i), sample_index));
+            result.stats.camera_rays += count as u64;
+            if self.options.needs(LayerKind::needs_indirect) {
+                self.gather(tile, selection, &mut result);
+            }
+            for i in 0..count {
+                if let Some(surface) = &tile.surfaces[i] {
+                    let (px, py) = pixel_of(i);
+                    let pixel = py * self.options.width + px;
+                    self.shade(surface, tile.irradiance.get(i), pixel, sample_index, i, &mut result);
+                }
+            }
+        }
+        if self.options.samples_per_pixel > 1 {
+            let share = 1.0 / self.options.samples_per_pixel as f32;
+            result.layers.iter_mut().flatten().for_each(|p| *p *= share);
+        }
+        result
+    }
+
+    /// What camera sample `sample_index` of a pixel sees.
+    fn see(&self, (px, py): (u32, u32), sample_index: u32) -> Option<Surface> {
+        let options = self.options;
+        let [u, v] = if options.samples_per_pixel == 1 {
+            [0.5, 0.5]
+        } else {
+            let stream = py * options.width + px;
+            Sequence::new(options.seed, stream).sample(sample_index.into()).next_2d()
+        };
+        let camera = &self.scene.camera;
+        let direction = camera.direction(px as f32 + u, py as f32 + v, options.width, options.height);
+        surface::first(self.scene, camera.position, direction)
+    }
+
+    fn gather(&self, tile: &mut Tile, selection: &mut Selection, result: &mut TileResult) {
+        self.culling.select(self.vsls, tile, selection);
+        result.skipped += selection.skipped;
+        match self.options.visibility {
+            Visibility::None => result.skipped += gather::accumulate(self.instructions, selection, tile),
+            Visibility::Rays => {
+                let shadowed = shadowed::accumulate(self.scene, &self.culling, selection, tile);
+                result.skipped += shadowed.skipped;
+                result.stats.vsl_rays += shadowed.rays;
+            }
+        }
+    }
+
+    /// Adds what one camera sample shows to every layer.
+    fn shade(
+        &self,
+        surface: &Surface,
+        irradiance: Vec3,
+        pixel: u32,
+        sample_index: u32,
+        i: usize,
+        result: &mut TileResult,
+    ) {
+        let brdf = surface.albedo * FRAC_1_PI;
+        let indirect = brdf * irradiance;
+        result.indirect += f64::from(indirect.max_element());
+        let mut direct = surface.emitted;
+        if self.options.needs(LayerKind::needs_direct) && surface.albedo != Vec3::ZERO {
+            let samples = self.options.light_samples;
+            let sequence = Sequence::new(self.options.seed ^ LIGHT_SEED, pixel);
+            let sample_of =
+                |k: u32| sequence.sample(u64::from(sample_index) * u64::from(samples) + u64::from(k));
+            let rays = &mut result.stats.light_rays;
+            direct += brdf * direct::irradiance_of_all(self.scene, surface, samples, sample_of, rays);
+        }
+        let owner = self.owners.as_ref().and_then(|o| o.find(surface));
+        for (layer, kind) in result.layers.iter_mut().zip(&self.options.layers) {
+            layer[i] += match kind {
+                LayerKind::Full => direct + indirect,
+                LayerKind::Direct => direct,
+                LayerKind::Indirect => indirect,
+                LayerKind::Albedo => surface.albedo,
+                LayerKind::Normal => (surface.normal + Vec3::ONE) * 0.5,
+                LayerKind::Vsl => owner.map_or(Vec3::ZERO, owner::colour),
+                LayerKind::Flux => owner.map_or(Vec3::ZERO, |o| radiosity(self.vsls, o)),
+                LayerKind::Depth => Vec3::splat(surface.distance),
+            };
+        }
+    }
+}
+
+/// Scrambles area-light samples apart from pixel samples.
+const LIGHT_SEED: u64 = 0x6C69_6768_7473_0000;
+
+/// Flux over area in W m⁻²; zero for a light without area.
+fn radiosity(vsls: &VslSet, index: usize) -> Vec3 {
+    let area = vsls.area[index];
+    if area > 0.0 { vsls.flux[index] / area } else { Vec3::ZERO }
+}

@@ -1,0 +1,56 @@
+//! Turns a camera ray's hit into the surface that is seen: place, normal, reflectance, emission.
+
+use glam::Vec3;
+use photonstream_scene::{
+    Scene,
+    bvh::{Hit, Ray},
+    Side,
+};
+use photonstream_shading::surface;
+
+/// What a ray has met, seen from where the ray came.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// The point on the surface.
+    pub(crate) position: Vec3,
+    /// The same point moved off the surface towards the viewer: where rays leave.
+    pub(crate) ray_origin: Vec3,
+    /// Unit normal of the visible side.
+    pub(crate) normal: Vec3,
+    /// Reflectance of the visible side; zero where that side is not modelled.
+    pub(crate) albedo: Vec3,
+    /// Radiance that the visible side emits, in W m⁻² sr⁻¹.
+    pub(crate) emitted: Vec3,
+    /// Index of the object.
+    pub(crate) object: u32,
+    /// Distance along the ray, in multiples of its direction.
+    pub(crate) distance: f32,
+}
+
+/// The first surface along a ray of unlimited length.
+#[inline]
+pub(crate) fn first(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<Surface> {
+    let ray = Ray { origin, direction, t_max: f32::INFINITY };
+    scene.bvh.closest(&ray).map(|hit| describe(scene, &hit, direction))
+}
+
+#[inline]
+fn describe(scene: &Scene, hit: &Hit, direction: Vec3) -> Surface {
+    let vertices = scene.geometry.triangle(hit.triangle);
+    let front = scene.geometry.normals[hit.triangle as usize];
+    let side = if front.dot(direction) < 0.0 { Side::Front } else { Side::Back };
+    let normal = front * side.sign();
+    let position = surface::point(vertices, hit.u, hit.v);
+    let id = scene.geometry.object_of[hit.triangle as usize];
+    let object = &scene.objects[id.0 as usize];
+    let albedo = if object.sides.contains(side) { scene.albedo(id) } else { Vec3::ZERO };
+    Surface {
+        position,
+        ray_origin: surface::offset(vertices, position, normal),
+        normal,
+        albedo,
+        emitted: scene.emitted_radiance(id, side),
+        object: id.0,
+        distance: hit.t,
+    }
+}

@@ -1,0 +1,141 @@
+//! Turns published records into checked virtual surface lights, one array per field.
+
+use crate::RenderError;
+use glam::Vec3;
+use photonstream_protocol::VslRecord;
+
+/// A virtual surface light: the light that leaves one patch of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vsl {
+    /// Centre of the patch, in metres from the scene's origin.
+    pub position: Vec3,
+    /// Unit normal of the lit side.
+    pub normal: Vec3,
+    /// Power that leaves the patch in W, linear RGB.
+    pub flux: Vec3,
+    /// Area of the patch in m².
+    pub area: f32,
+    /// Index of the object that carries it.
+    pub object: u32,
+}
+
+/// The virtual surface lights of one frame, one array per field, all of equal length.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct VslSet {
+    pub(crate) position: Vec<Vec3>,
+    pub(crate) normal: Vec<Vec3>,
+    pub(crate) flux: Vec<Vec3>,
+    pub(crate) area: Vec<f32>,
+    pub(crate) object: Vec<u32>,
+}
+
+impl VslSet {
+    /// The lights of a published frame.
+    ///
+    /// # Errors
+    /// [`RenderError::Vsl`] for a value that is not finite, a negative area or flux, a normal that is not of unit
+    /// length.
+    pub fn from_records(records: &[VslRecord]) -> Result<Self, RenderError> {
+        Self::new(records.iter().map(|r| Vsl {
+            position: r.position.into(),
+            normal: r.normal.into(),
+            flux: r.flux.into(),
+            area: r.area,
+            object: r.object,
+        }))
+    }
+
+    /// The given lights, in their order.
+    ///
+    /// # Errors
+    /// As [`VslSet::from_records`].
+    pub fn new(vsls: impl IntoIterator<Item = Vsl>) -> Result<Self, RenderError> {
+        let mut set = Self::default();
+        for (index, vsl) in vsls.into_iter().enumerate() {
+            check(index, &vsl)?;
+            set.position.push(vsl.position);
+            set.normal.push(vsl.normal);
+            set.flux.push(vsl.flux);
+            set.area.push(vsl.area);
+            set.object.push(vsl.object);
+        }
+        Ok(set)
+    }
+
+    /// Number of lights.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// The light number `index`.
+    pub fn get(&self, index: usize) -> Option<Vsl> {
+        (index < self.len()).then(|| Vsl {
+            position: self.position[index],
+            normal: self.normal[index],
+            flux: self.flux[index],
+            area: self.area[index],
+            object: self.object[index],
+        })
+    }
+}
+
+fn check(index: usize, vsl: &Vsl) -> Result<(), RenderError> {
+    let wrong = |field, found: String, expected| Err(RenderError::Vsl { index, field, found, expected });
+    if !vsl.position.is_finite() {
+        return wrong("position", vsl.position.to_string(), "finite metres");
+    }
+    // The rounding of three components stays far below this.
+    if !((vsl.normal.length_squared() - 1.0).abs() < 1e-4) {
+        return wrong("normal", vsl.normal.to_string(), "unit length");
+    }
+    if !(vsl.flux.is_finite() && vsl.flux.min_element() >= 0.0) {
+        return wrong("flux", vsl.flux.to_string(), "finite W, 0 or more");
+    }
+    if !(vsl.area.is_finite() && vsl.area >= 0.0) {
+        return wrong("area", vsl.area.to_string(), "finite m², 0 or more");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unusable_lights_are_named() {
+        let good = Vsl { position: Vec3::ONE, normal: Vec3::Y, flux: Vec3::ONE, area: 0.1, object: 3 };
+        let set = VslSet::new([good, good]).unwrap();
+        assert_eq!((set.len(), set.get(1), set.get(2)), (2, Some(good), None));
+        for (bad, field) in [
+            (Vsl { position: Vec3::NAN, ..good }, "position"),
+            (Vsl { normal: Vec3::splat(1.0), ..good }, "normal"),
+            (Vsl { normal: Vec3::NAN, ..good }, "normal"),
+            (Vsl { flux: Vec3::new(0.0, -1.0, 0.0), ..good }, "flux"),
+            (Vsl { area: f32::INFINITY, ..good }, "area"),
+        ] {
+            let error = VslSet::new([good, bad]).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("virtual surface light 1: {field}: found ")), "{error}");
+        }
+    }
+
+    #[test]
+    fn records_keep_their_values() {
+        let record = VslRecord {
+            position: [1.0, 2.0, 3.0],
+            normal: [0.0, 0.0, -1.0],
+            flux: [0.1, 0.2, 0.3],
+            area: 0.5,
+            object: 7,
+            ..VslRecord::default()
+        };
+        let vsl = VslSet::from_records(&[record]).unwrap().get(0).unwrap();
+        assert_eq!(vsl.position, Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!((vsl.normal, vsl.area, vsl.object), (Vec3::NEG_Z, 0.5, 7));
+        assert_eq!(vsl.flux, Vec3::new(0.1, 0.2, 0.3));
+    }
+}
