@@ -81,7 +81,7 @@ pub(crate) fn snapped_centre((low, high): (DVec3, DVec3)) -> DVec3 {
     if !(extent > 0.0 && extent.is_finite()) {
         return DVec3::ZERO;
     }
-    let step = ((extent * (1.0 + BIAS)).log2().floor() - 6.0).exp2();
+    let step = ((extent * (1.0 + BIAS)).log2().floor() - 6.0).max(-60.0).exp2();
     ((low + (high - low) * 0.5) / step + (0.5 + BIAS)).floor() * step + DVec3::ZERO
 }
 

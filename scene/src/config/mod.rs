@@ -3,6 +3,8 @@
 mod decode;
 mod document;
 mod domain;
+#[cfg(test)]
+mod keys;
 mod values;
 
 pub(crate) use document::{Document, Field};

@@ -57,18 +57,20 @@ pub(crate) fn load_obj(path: &Path) -> Result<Import, (PathBuf, String)> {
     let read = RefCell::new(Vec::new());
     let problems = RefCell::new(Vec::new());
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
-    let loaded = tobj::load_obj_buf(&mut bytes.as_slice(), &options, |name| {
+    let positions_and_faces = without_texture_coordinates_and_normals(&bytes);
+    let loaded = tobj::load_obj_buf(&mut positions_and_faces.as_slice(), &options, |name| {
         let file = path.parent().unwrap_or(Path::new("")).join(name);
         let content = fs::read(&file).map_err(|e| {
             problems.borrow_mut().push(format!("material file {} cannot be read ({e})", file.display()));
             tobj::LoadError::OpenFileFailed
         })?;
-        let parsed = tobj::load_mtl_buf(&mut content.as_slice());
-        if let Err(e) = &parsed {
-            problems.borrow_mut().push(format!("material file {}: {e}", file.display()));
-        }
+        let parsed = complete_colours(&String::from_utf8_lossy(&content))
+            .and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| e.to_string()));
         read.borrow_mut().push(content);
-        parsed
+        parsed.map_err(|problem| {
+            problems.borrow_mut().push(format!("material file {}: {problem}", file.display()));
+            tobj::LoadError::MaterialParseError
+        })
     });
     let (models, materials) = loaded.map_err(|e| at(format!("not a valid OBJ file: {e}")))?;
     read.into_inner().iter().for_each(|content| hash_file(&mut hasher, content));
@@ -95,6 +97,41 @@ pub(crate) fn load_obj(path: &Path) -> Result<Import, (PathBuf, String)> {
 fn hash_file(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     hasher.update(bytes);
+}
+
+/// Leaves out what is not imported: tobj checks its indices less strictly than those of positions.
+fn without_texture_coordinates_and_normals(bytes: &[u8]) -> Vec<u8> {
+    let lines = bytes.split_inclusive(|b| *b == b'\n');
+    lines
+        .filter(|line| {
+            !line.trim_ascii_start().starts_with(b"vt") && !line.trim_ascii_start().starts_with(b"vn")
+        })
+        .flatten()
+        .copied()
+        .collect()
+}
+
+/// Writes colours of one number, which MTL allows for greys, with the three that tobj wants, and refuses others.
+fn complete_colours(text: &str) -> Result<String, String> {
+    let mut complete = String::with_capacity(text.len());
+    for (index, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split('#').next().unwrap_or_default().split_whitespace().collect();
+        match words.as_slice() {
+            ["Ka" | "Kd" | "Ks" | "Ke", numbers @ ..] if numbers.len() != 3 => match numbers {
+                [grey] => complete.push_str(&format!("{} {grey} {grey} {grey}", words[0])),
+                _ => {
+                    let found = words.join(" ");
+                    return Err(format!(
+                        "line {}: found `{found}`, expected one or three numbers",
+                        index + 1
+                    ));
+                }
+            },
+            _ => complete.push_str(line),
+        }
+        complete.push('\n');
+    }
+    Ok(complete)
 }
 
 fn imported_material(material: &tobj::Material) -> ImportedMaterial {

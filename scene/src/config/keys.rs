@@ -1,0 +1,153 @@
+//! Checks that the documented keys and defaults are those that exist.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use std::{collections::BTreeSet, path::Path};
+use toml::{Table, Value};
+
+const README: &str = include_str!("../../../configs/README.md");
+
+/// A config with every key there is: a struct literal each, so that a new key does not compile until it is here.
+fn every_key() -> SceneConfig {
+    let v = Vector([1.0, 2.0, 3.0]);
+    let c = Some(OneOrThree([1.0; 3]));
+    let object = ObjectConfig {
+        material: Some("m".into()),
+        sides: Some(Sides::Both),
+        position_m: Some(v),
+        rotation_deg: Some(v),
+        scale: c,
+        quad: Some(QuadConfig { corner_m: v, edge_u_m: v, edge_v_m: v }),
+        cuboid: Some(BoxConfig { size_m: v }),
+        sphere: Some(SphereConfig { radius_m: 1.0, segments: Some(1) }),
+        torus_knot: Some(TorusKnotConfig {
+            p: Some(1),
+            q: Some(1),
+            radius_m: 1.0,
+            tube_radius_m: 1.0,
+            segments: Some(1),
+            tube_segments: Some(1),
+        }),
+        obj: Some(ObjConfig { path: "p".into(), exclude: Some(vec!["x".into()]) }),
+    };
+    let light = LightConfig {
+        power_w: c,
+        irradiance_w_m2: c,
+        spot: Some(SpotConfig {
+            position_m: v,
+            target_m: Some(v),
+            direction: Some(v),
+            outer_half_angle_deg: 1.0,
+            inner_half_angle_deg: Some(1.0),
+        }),
+        point: Some(PointConfig { position_m: v }),
+        directional: Some(DirectionalConfig { direction: v }),
+        rectangle: Some(RectangleConfig { corner_m: v, edge_u_m: v, edge_v_m: v, albedo: c }),
+    };
+    SceneConfig {
+        name: Some("n".into()),
+        origin_m: Some(v),
+        camera: CameraConfig { position_m: v, target_m: v, up: Some(v), vertical_fov_deg: 1.0 },
+        material: [("NAME".into(), MaterialConfig { albedo: OneOrThree([0.5; 3]) })].into(),
+        object: [("NAME".into(), object)].into(),
+        light: [("NAME".into(), light)].into(),
+        streaming: StreamingConfig {
+            vsls: Some(1),
+            pool_paths: Some(1),
+            sampling: Some(Sampling::Fresh),
+            seed: Some(1),
+            placement_scale: Some(1.0),
+            publish_period_ms: Some(1.0),
+            threads: Some(1),
+            light_columns: Some(1),
+        },
+        render: RenderConfig {
+            width_px: Some(1),
+            height_px: Some(1),
+            kernel: Some(Kernel::Paper),
+            visibility: Some(Visibility::None),
+            epsilon: Some(1.0),
+            light_samples: Some(1),
+            exposure_ev: Some(1.0),
+            tone_map: Some(ToneMap::Linear),
+        },
+        document: Document::default(),
+    }
+}
+
+fn leaves(value: &Value, path: &str, out: &mut BTreeSet<String>) {
+    match value {
+        Value::Table(table) => table.iter().for_each(|(key, value)| {
+            leaves(value, &if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, out)
+        }),
+        _ => _ = out.insert(path.to_owned()),
+    }
+}
+
+/// The rows of the key table: (key, default).
+fn documented() -> Vec<(String, String)> {
+    let (_, table) = README.split_once("| key | type |").unwrap();
+    let rows = table.lines().skip(2).filter(|line| line.starts_with("| `"));
+    rows.map(|line| {
+        let cells: Vec<_> = line.trim_matches('|').split('|').map(str::trim).collect();
+        assert_eq!(cells.len(), 5, "{line}");
+        (cells[0].trim_matches('`').to_owned(), cells[3].to_owned())
+    })
+    .collect()
+}
+
+#[test]
+fn the_table_lists_exactly_the_keys_that_exist() {
+    let config = every_key();
+    let mut existing = BTreeSet::new();
+    leaves(&Value::Table(Table::try_from(&config).unwrap()), "", &mut existing);
+    let rows = documented();
+    let listed: BTreeSet<String> = rows.iter().map(|(key, _)| key.clone()).collect();
+    assert_eq!(listed.len(), rows.len(), "a key is listed twice");
+    assert_eq!(listed, existing);
+    // All of it survives being written and read.
+    let again = SceneConfig::from_text(&toml::to_string(&config).unwrap(), Path::new("")).unwrap();
+    assert_eq!(SceneConfig { document: Document::default(), ..again }, config);
+}
+
+#[test]
+fn documented_defaults_are_those_of_a_resolved_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let text = r#"
+        camera = { position_m = [0, 0, 5], target_m = [0, 0, 0], vertical_fov_deg = 40 }
+        material.m.albedo = 0.5
+        object.a = { material = "m", sphere = { radius_m = 1 } }
+        object.b = { material = "m", torus-knot = { radius_m = 1, tube_radius_m = 0.1 } }
+        object.c = { obj = { path = "a.obj" } }
+        light.d = { power_w = 1, rectangle = { corner_m = [0, 3, 0], edge_u_m = [1, 0, 0], edge_v_m = [0, 0, 1] } }
+    "#;
+    let config = SceneConfig::from_text(text, &folder.path().join("scene.toml")).unwrap();
+    let scene = config.build().unwrap();
+    let resolved: Table = scene.resolved_text.parse().unwrap();
+    let mut checked = 0;
+    for (key, default) in documented() {
+        let Some(default) = default.strip_prefix('`').and_then(|d| d.strip_suffix('`')) else { continue };
+        let expected: Table = format!("value = {default}").parse().unwrap();
+        let (table, rest) = key.split_once(".NAME.").map_or((key.as_str(), None), |(t, r)| (t, Some(r)));
+        let mut found = Vec::new();
+        match rest {
+            None => found.extend(look_up(&Value::Table(resolved.clone()), table)),
+            Some(rest) => {
+                let named = resolved[table].as_table().unwrap();
+                found.extend(named.values().filter_map(|value| look_up(value, rest)));
+            }
+        }
+        assert!(!found.is_empty(), "{key} is not resolved");
+        assert!(
+            found.iter().all(|value| *value == expected["value"]),
+            "{key}: {found:?}, documented {default}"
+        );
+        checked += 1;
+    }
+    assert!(checked >= 20, "only {checked} defaults found in the table");
+}
+
+fn look_up(value: &Value, path: &str) -> Option<Value> {
+    path.split('.').try_fold(value, |value, key| value.get(key)).cloned()
+}
