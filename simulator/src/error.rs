@@ -26,6 +26,9 @@ pub enum SimulatorError {
         /// Which one.
         actor: &'static str,
     },
+    /// A scene without light has nothing to measure.
+    #[error("the scene sends out no photon: nothing to measure; add a light with power")]
+    NothingToMeasure,
     /// Signal handlers could not be installed.
     #[error("cannot handle signals: {0}")]
     Signals(std::io::Error),

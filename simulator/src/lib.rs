@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod apportion;
+pub mod bench;
 pub mod cli;
 pub mod counters;
 pub mod emitters;

@@ -10,7 +10,10 @@ use crate::{
     owner::OwnerTable,
 };
 use glam::Vec3;
-use photonstream_scene::{Geometry, Scene, Side, Sides, bvh::Ray};
+use photonstream_scene::{
+    Geometry, Scene, Side, Sides,
+    bvh::{Hit, Ray},
+};
 use photonstream_shading::{sampling, surface};
 use std::sync::Arc;
 
@@ -68,6 +71,21 @@ impl PathBatch {
     }
 }
 
+/// Sees what a tracer does; `()` sees nothing and costs nothing.
+pub(crate) trait Watcher {
+    /// A ray is about to be traced.
+    fn ray(&mut self, ray: &Ray);
+    /// A ray was reflected at `hit`.
+    fn reflection(&mut self, hit: &Hit, side: Side);
+}
+
+impl Watcher for () {
+    #[inline]
+    fn ray(&mut self, _: &Ray) {}
+    #[inline]
+    fn reflection(&mut self, _: &Hit, _: Side) {}
+}
+
 impl Tracer {
     /// A tracer for `scene` with its owners and emitters.
     pub fn new(scene: Arc<Scene>, owners: Arc<OwnerTable>, emitters: Arc<Emitters>) -> Self {
@@ -87,6 +105,18 @@ impl Tracer {
     /// Generation 0 always replays the same samples; counting it up streams through the sequence. All slots of a batch
     /// must belong to one light.
     pub fn trace(&self, first_slot: u32, count: u32, generation: u64, batch: &mut PathBatch) {
+        self.trace_watched(first_slot, count, generation, batch, &mut ());
+    }
+
+    /// [`Tracer::trace`], with every ray and hit shown to `watcher`.
+    pub(crate) fn trace_watched(
+        &self,
+        first_slot: u32,
+        count: u32,
+        generation: u64,
+        batch: &mut PathBatch,
+        watcher: &mut impl Watcher,
+    ) {
         batch.clear();
         batch.first_slot = first_slot;
         let light = self.emitters.light_of(first_slot);
@@ -94,14 +124,14 @@ impl Tracer {
         let base = generation * u64::from(light.slots.end - light.slots.start);
         for slot in first_slot..first_slot + count {
             let start = batch.deposits.len();
-            self.trace_path(light, base + u64::from(slot - light.slots.start), batch);
+            self.trace_path(light, base + u64::from(slot - light.slots.start), batch, watcher);
             batch.lengths.push((batch.deposits.len() - start) as u16);
         }
         batch.counters.paths += u64::from(count);
         batch.counters.deposits += batch.deposits.len() as u64;
     }
 
-    fn trace_path(&self, light: &LightSlots, index: u64, batch: &mut PathBatch) {
+    fn trace_path(&self, light: &LightSlots, index: u64, batch: &mut PathBatch, watcher: &mut impl Watcher) {
         let mut sample = light.sequence.sample(index);
         let shape = &self.scene.lights[light.light.0 as usize].light.shape;
         let emission = shape.emit(self.scene.bounds, &mut sample);
@@ -111,11 +141,13 @@ impl Tracer {
         }
         let mut ray = Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
         for _ in 0..MAX_DEPOSITS {
-            if !(ray.origin.is_finite() && ray.direction.is_finite() && throughput.is_finite()) {
+            // One sum instead of nine tests: it is finite unless something in it is not.
+            if !(ray.origin + ray.direction + throughput).is_finite() {
                 batch.counters.rejected += 1;
                 return;
             }
             batch.counters.rays += 1;
+            watcher.ray(&ray);
             let Some(hit) = self.scene.bvh.closest(&ray) else {
                 batch.counters.escaped += 1;
                 return;
@@ -128,6 +160,7 @@ impl Tracer {
                 return;
             }
             throughput *= reflection.albedo;
+            watcher.reflection(&hit, side);
             let Some(owner) = self.owners.owner(hit.triangle, side, hit.u, hit.v) else {
                 batch.counters.rejected += 1;
                 return;
