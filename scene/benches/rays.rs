@@ -4,7 +4,7 @@
 //! stream seeded by i: the same rays for every tracer. Rounds alternate between the tracers, the best round counts.
 //! `PHOTONSTREAM_SCENES` names the folder with `dabrovic_sponza/sponza.obj`; without it only the box is walked.
 //! `PHOTONSTREAM_SOUP=DIR` also writes each scene as a triangle soup (u32 count, 9 f32 per triangle) for other tracers.
-#![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
+#![allow(clippy::print_stdout, clippy::unwrap_used, clippy::single_range_in_vec_init, missing_docs)]
 
 use glam::{Vec3, Vec3A, vec3};
 use obvhs::BvhBuildParams;

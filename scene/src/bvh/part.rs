@@ -1,5 +1,6 @@
 //! Turns the triangles of one part of a scene into an eight-wide tree of nodes and triangle packets.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::{Vec3, Vec3A};
@@ -16,10 +17,15 @@ use super::triangle::{Packet, is_solid};
 
 /// Part of the nodes that the first pass of reinsertion considers.
 const REINSERTED: f32 = 0.2;
+/// The same above [`CLUSTERED_UP_TO`] triangles, where building time matters more than a few per cent of ray speed.
+const REINSERTED_IN_LARGE: f32 = 0.01;
 /// Reinsertion is left out if more than one node in this many has two children of its own size.
 const STACKED_PART: usize = 32;
 /// Up to this number of triangles both ways of building are tried.
-const CLUSTERED_UP_TO: usize = 1_000_000;
+const CLUSTERED_UP_TO: usize = 300_000;
+
+/// Clustering is left out if more boxes than this are the same: it would join one pair of them a pass.
+const LARGEST_STACK: usize = 64;
 
 /// The ray-tracing structure of one part: world-space triangles under eight-wide nodes.
 #[derive(Clone, Debug)]
@@ -84,7 +90,7 @@ impl Bvh {
 pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     let mut cut = split(boxes);
     improve(&mut cut);
-    if boxes.len() > CLUSTERED_UP_TO || boxes.len() < 2 {
+    if boxes.len() > CLUSTERED_UP_TO || boxes.len() < 2 || largest_stack(boxes) > LARGEST_STACK {
         return cut;
     }
     let mut clustered = PlocBuilder::with_capacity(boxes.len()).build(
@@ -96,6 +102,16 @@ pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     );
     improve(&mut clustered);
     if surface_cost(&clustered) < surface_cost(&cut) { clustered } else { cut }
+}
+
+/// Number of boxes that are the same, at most.
+fn largest_stack(boxes: &[Aabb]) -> usize {
+    let mut heights = HashMap::with_capacity(boxes.len());
+    for bounds in boxes {
+        let key = [bounds.min, bounds.max].map(|corner| corner.to_array().map(f32::to_bits));
+        *heights.entry(key).or_insert(0usize) += 1;
+    }
+    heights.into_values().max().unwrap_or(0)
 }
 
 /// Moves subtrees to cheaper places, unless many lie on top of each other: the search for a place could then reject
@@ -112,7 +128,9 @@ fn improve(tree: &mut Bvh2) {
     if stacked.count() > tree.nodes.len() / STACKED_PART {
         return;
     }
-    ReinsertionOptimizer::default().run(tree, REINSERTED, None);
+    let large = tree.primitive_indices.len() > CLUSTERED_UP_TO;
+    let part = if large { REINSERTED_IN_LARGE } else { REINSERTED };
+    ReinsertionOptimizer::default().run(tree, part, None);
 }
 
 /// Area of all inner nodes: what a random line pays.

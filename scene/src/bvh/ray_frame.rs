@@ -82,8 +82,8 @@ impl RayFrame {
             t_scale: scale,
         };
         let d = direction.to_array();
-        for k in 0..3 {
-            let component = d[k].abs().max(smallest).copysign(d[k]);
+        for (k, d) in d.into_iter().enumerate() {
+            let component = d.abs().max(smallest).copysign(d);
             frame.inverse[k] = 1.0 / component;
             let outwards = pad.copysign(component);
             frame.near_origin[k] = frame.origin[k] + outwards;
@@ -96,14 +96,12 @@ impl RayFrame {
     }
 }
 
+/// The largest component's axis last, the others before it in cyclic order; no branch, as rays are incoherent.
 #[inline(always)]
 fn largest_axis(direction: Vec3) -> [usize; 3] {
+    const ENDING_IN: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
     let d = direction.abs();
-    if d.x >= d.y && d.x >= d.z {
-        [1, 2, 0]
-    } else if d.y >= d.z {
-        [2, 0, 1]
-    } else {
-        [0, 1, 2]
-    }
+    let y_over_x = usize::from(d.y > d.x);
+    let z_over_both = usize::from(d.z > d.x) & usize::from(d.z > d.y);
+    ENDING_IN[(z_over_both << 1) | (y_over_x & !z_over_both & 1)]
 }

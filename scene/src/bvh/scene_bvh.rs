@@ -89,7 +89,7 @@ impl SceneBvh {
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let frame = RayFrame::new(ray, self.lo, self.hi)?;
         let nearest = self.run::<false>(&frame);
-        nearest.found.then(|| Hit {
+        nearest.found.then_some(Hit {
             t: nearest.t * frame.t_scale,
             u: nearest.u,
             v: nearest.v,

@@ -146,9 +146,13 @@ pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32
         Sheared::new(frame, &triangle[2]),
     );
     let (u, v, w) = (exact_edge(&c, &b), exact_edge(&a, &c), exact_edge(&b, &a));
-    let agree = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    let smallest = if u < v { u } else { v };
+    let smallest = if w < smallest { w } else { smallest };
+    let largest = if u > v { u } else { v };
+    let largest = if w > largest { w } else { largest };
     let determinant = u + v + w;
-    if !agree || determinant == 0.0 {
+    // One branch, nearly always taken: which side the ray comes from is not to be predicted.
+    if !((smallest >= 0.0) | (largest <= 0.0)) | (determinant == 0.0) {
         return None;
     }
     let inverse = 1.0 / determinant;
@@ -202,7 +206,7 @@ fn extent(a: f32, b: f32, c: f32) -> (f32, f32) {
 #[inline(always)]
 fn interval(low: f32, high: f32, inverse: f32) -> (f32, f32) {
     let (p, q) = (low * inverse, high * inverse);
-    if inverse < 0.0 { (q, p) } else { (p, q) }
+    (smaller(p, q), larger(p, q))
 }
 
 /// The smaller of two numbers that are not NaN, in one instruction.

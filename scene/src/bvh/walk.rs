@@ -96,8 +96,10 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
                 } else if rest & (rest - 1) == 0 {
                     let second = rest.trailing_zeros() as usize % WIDTH;
                     let entry = l.store(entry);
-                    let swap = entry.0[second] < entry.0[first];
-                    let (near, far) = if swap { (second, first) } else { (first, second) };
+                    // Without a branch: which of two is nearer is not to be predicted.
+                    let swap = usize::from(entry.0[second] < entry.0[first]);
+                    let flip = (first ^ second) & swap.wrapping_neg();
+                    let (near, far) = (first ^ flip, second ^ flip);
                     current = node.children.0[near];
                     stack.references[top] = node.children.0[far];
                     stack.distances[top] = entry.0[far];

@@ -24,7 +24,7 @@ fn loop_over_all(mesh: &Mesh, ray: &Ray) -> Option<Hit> {
             nearest.offer(id as u32, hit);
         }
     }
-    nearest.found.then(|| Hit {
+    nearest.found.then_some(Hit {
         t: nearest.t * frame.t_scale,
         u: nearest.u,
         v: nearest.v,

@@ -127,3 +127,24 @@ fn a_part_in_a_thousand_of_the_scene_is_found() {
         assert!(scene.closest(&ray).unwrap().triangle >= first);
     }
 }
+
+#[test]
+fn sizes_in_geometric_progression_stay_within_the_depth_bound() {
+    // Shells that enclose each other from 10⁻¹² m to 10¹² m: every cut peels few off, the binary tree is a comb.
+    let mut mesh = Mesh::default();
+    for i in 0..2_000 {
+        let shell = moved(&triangle(), 10.0f32.powf(-12.0 + 24.0 * i as f32 / 2_000.0), Vec3::ZERO);
+        let base = mesh.0.len() as u32;
+        mesh.0.extend(shell.0);
+        mesh.1.push([base, base + 1, base + 2]);
+    }
+    for scene in on_every_path(&build(&mesh)) {
+        // All lie in the plane x = 0; numbers rise with size.
+        let through = |y: f32| {
+            let ray = Ray { origin: vec3(-1.0, y, 0.0), direction: Vec3::X, t_max: f32::INFINITY };
+            scene.closest(&ray).unwrap().triangle
+        };
+        assert_eq!(through(0.0), 0);
+        assert!(through(1e-6) < through(1.0) && through(1.0) < through(1e6));
+    }
+}

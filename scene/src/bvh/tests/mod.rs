@@ -1,5 +1,6 @@
 //! Turns soups, closed meshes and extreme rays into checks of every promise the structure makes.
-#![allow(clippy::unwrap_used)]
+// One part is a list of one range, and meant as such.
+#![allow(clippy::unwrap_used, clippy::single_range_in_vec_init)]
 
 mod brute_force;
 mod degenerate;
