@@ -1,7 +1,7 @@
 //! Turns placed meshes into one soup of triangles in the scene's own space, around an origin of its own.
 
 use crate::{
-    config::Field,
+    config::{Field, MAX_LENGTH_M},
     error::SceneError,
     placement::Placement,
     primitives::Mesh,
@@ -158,7 +158,7 @@ fn push_vertices(geometry: &mut Geometry, part: &Part<'_>, origin: DVec3) -> Res
     let rest_centre = snapped_centre(box_around(used));
     for &vertex in &part.mesh.vertices {
         let world = placement.apply(vertex) - origin;
-        if !(world.abs().max_element() <= crate::config::MAX_LENGTH_M) {
+        if !world.is_finite() || world.abs().max_element() > MAX_LENGTH_M {
             return Err(part.field.invalid(
                 format!("a vertex {world} m from the scene's origin"),
                 "all vertices within 1e9 m of it",

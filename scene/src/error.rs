@@ -38,7 +38,7 @@ pub enum SceneError {
     #[error("{place}: not valid TOML: {problem}")]
     Syntax {
         /// Where the parser stopped.
-        place: Place,
+        place: Box<Place>,
         /// What it expected.
         problem: String,
     },
@@ -46,7 +46,7 @@ pub enum SceneError {
     #[error("{place}: unknown key \"{key}\"{}", hint(nearest.as_deref(), valid))]
     UnknownKey {
         /// The table that holds it.
-        place: Place,
+        place: Box<Place>,
         /// The key as written.
         key: String,
         /// The most similar valid key.
@@ -58,7 +58,7 @@ pub enum SceneError {
     #[error("{place}: the key \"{key}\" is missing; add it (configs/README.md lists every key)")]
     MissingKey {
         /// The table that lacks it.
-        place: Place,
+        place: Box<Place>,
         /// The missing key.
         key: String,
     },
@@ -66,7 +66,7 @@ pub enum SceneError {
     #[error("{place}: {problem}")]
     WrongType {
         /// The value.
-        place: Place,
+        place: Box<Place>,
         /// What was found and expected.
         problem: String,
     },
@@ -74,7 +74,7 @@ pub enum SceneError {
     #[error("{place}: found {found}, expected {expected}; {remedy}")]
     Invalid {
         /// The value.
-        place: Place,
+        place: Box<Place>,
         /// What the file says.
         found: String,
         /// What would be valid.
@@ -86,7 +86,7 @@ pub enum SceneError {
     #[error("{place}: no {kind} is called \"{found}\"{}", hint(nearest.as_deref(), known))]
     UnknownName {
         /// The reference.
-        place: Place,
+        place: Box<Place>,
         /// What it should name, for example `material`.
         kind: &'static str,
         /// The name as written.
@@ -104,7 +104,7 @@ pub enum SceneError {
     )]
     AssetMissing {
         /// The reference.
-        place: Place,
+        place: Box<Place>,
         /// The path as written.
         asset: String,
         /// Where it was looked for, in order.
@@ -114,7 +114,7 @@ pub enum SceneError {
     #[error("{place}: asset {}: {problem}; {remedy}", asset.display())]
     Asset {
         /// The reference.
-        place: Place,
+        place: Box<Place>,
         /// The file.
         asset: PathBuf,
         /// What is wrong with it.

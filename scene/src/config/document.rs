@@ -13,17 +13,17 @@ pub(crate) struct Document {
 
 impl Document {
     /// The place of a byte offset.
-    pub(crate) fn place_at(&self, offset: Option<usize>, field: String) -> Place {
+    pub(crate) fn place_at(&self, offset: Option<usize>, field: String) -> Box<Place> {
         let line_column = offset.and_then(|offset| {
             let before = self.text.get(..offset)?;
             let line_start = before.rfind('\n').map_or(0, |i| i + 1);
             Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
         });
-        Place { file: self.file.clone(), line_column, field }
+        Box::new(Place { file: self.file.clone(), line_column, field })
     }
 
     /// The place of the value called `keys`, or of the deepest of the tables around it that the text holds.
-    pub(crate) fn place(&self, keys: &[String]) -> Place {
+    pub(crate) fn place(&self, keys: &[String]) -> Box<Place> {
         self.place_at(self.offset(keys), keys.join("."))
     }
 
@@ -94,7 +94,7 @@ impl<'a> Field<'a> {
         Self { document: self.document, keys }
     }
 
-    pub(crate) fn place(&self) -> Place {
+    pub(crate) fn place(&self) -> Box<Place> {
         self.document.place(&self.keys)
     }
 
