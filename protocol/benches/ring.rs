@@ -1,5 +1,5 @@
 //! Turns the figures the protocol must hold into ratios and times of one run: `cargo bench -p photonstream-protocol`.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -64,14 +64,22 @@ fn read(subscriber: &mut Subscriber) {
 
 const COUNTS: [usize; 2] = [10_000, 100_000];
 
-/// The measure of all: the same bytes, private to private.
+/// The measure of all: the same bytes by `memcpy`, from three buffers in turn into two, as the ring and its reader do.
 #[divan::bench(args = COUNTS)]
 fn memcpy(bencher: Bencher<'_, '_>, count: usize) {
-    let from = vec![VslRecord::default(); count];
-    let mut to = from.clone();
-    bencher.counter(BytesCount::new(count * 64)).bench_local(|| {
-        divan::black_box(&mut to).copy_from_slice(divan::black_box(&from));
-    });
+    let from = std::cell::RefCell::new(vec![vec![VslRecord::default(); count]; 3]);
+    let mut to = vec![vec![VslRecord::default(); count]; 2];
+    let mut turn = 0;
+    bencher
+        .counter(BytesCount::new(count * 64))
+        .with_inputs(|| {
+            turn += 1;
+            from.borrow_mut()[turn % 3].fill(VslRecord { generation: turn as u32, ..VslRecord::default() });
+            turn
+        })
+        .bench_local_values(|turn| {
+            divan::black_box(&mut to[turn % 2]).copy_from_slice(divan::black_box(&from.borrow()[turn % 3]));
+        });
 }
 
 /// A full frame, all chunks new.

@@ -30,7 +30,7 @@ const fn masks(fields: &[Field]) -> ExponentMasks {
         while at < field.offset + field.size {
             match field.kind {
                 FieldType::F32 => {
-                    let high = if cfg!(target_endian = "little") { at % 8 == 4 } else { at % 8 == 0 };
+                    let high = (at % 8 == 4) == cfg!(target_endian = "little");
                     let shift = if high { 32 } else { 0 };
                     masks.mask[at / 8] |= F32_MASK << shift;
                     masks.unit[at / 8] |= F32_UNIT << shift;

@@ -21,7 +21,11 @@ mod mapping;
 mod process;
 mod publisher;
 mod reader_segment;
+#[cfg(test)]
+mod readme;
 mod record;
+#[cfg(test)]
+mod ring_heap;
 #[cfg(test)]
 mod ring_loom;
 mod ring_read;

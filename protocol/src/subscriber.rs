@@ -15,6 +15,8 @@ use crate::shape::HEAD_WORDS;
 
 /// Time one `read` may take before it reports `Busy`.
 const READ_LIMIT: Duration = Duration::from_millis(2);
+/// Chunks copied between two looks at the clock (a few microseconds).
+const CHUNKS_PER_LOOK: u32 = 16;
 /// Age of a heartbeat from which the simulator is no longer taken to run.
 const STALE_AFTER: Duration = Duration::from_millis(500);
 /// Time between two looks for a successor, once the segment is over.
@@ -187,7 +189,11 @@ impl Subscriber {
 
     fn read_segment(&mut self) -> Result<Outcome, ProtocolError> {
         let start = Instant::now();
-        let mut spent = || start.elapsed() >= READ_LIMIT;
+        let mut copied = 0u32;
+        let mut spent = || {
+            copied += 1;
+            copied.is_multiple_of(CHUNKS_PER_LOOK) && start.elapsed() >= READ_LIMIT
+        };
         let before = self.reader.seen();
         let outcome = match self.segment.words() {
             Words::Mapped(words) => self.reader.read(words, &mut self.frames, &mut self.head, &mut spent),

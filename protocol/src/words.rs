@@ -62,7 +62,13 @@ impl ReadWords for [AtomicU64] {
     fn read(&self, at: usize, into: &mut [u64]) -> Result<(), ProtocolError> {
         let from = at.checked_add(into.len()).and_then(|end| self.get(at..end));
         let from = from.ok_or_else(|| out_of_range(at, into.len(), self.len()))?;
-        for (to, word) in into.iter_mut().zip(from) {
+        // Eight words a step: atomic loads are not unrolled by the compiler.
+        let (steps, rest) = into.as_chunks_mut::<8>();
+        let (from_steps, from_rest) = from.as_chunks::<8>();
+        for (to, from) in steps.iter_mut().zip(from_steps) {
+            *to = from.each_ref().map(|word| word.load(Ordering::Relaxed));
+        }
+        for (to, word) in rest.iter_mut().zip(from_rest) {
             *to = word.load(Ordering::Relaxed);
         }
         Ok(())
@@ -98,7 +104,17 @@ impl WriteWords for [AtomicU64] {
 
     #[inline]
     fn write_stamped(&self, at: usize, from: &[u64], record_words: usize, stamp: u64) {
-        let to = self[at..at + from.len()].chunks_exact(record_words);
+        let to = &self[at..at + from.len()];
+        if record_words == 8 {
+            for (to, from) in to.as_chunks::<8>().0.iter().zip(from.as_chunks::<8>().0) {
+                to[0].store(stamp, Ordering::Relaxed);
+                for k in 1..8 {
+                    to[k].store(from[k], Ordering::Relaxed);
+                }
+            }
+            return;
+        }
+        let to = to.chunks_exact(record_words);
         for (to, from) in to.zip(from.chunks_exact(record_words)) {
             to[0].store(stamp, Ordering::Relaxed);
             for (word, value) in to[1..].iter().zip(&from[1..]) {
