@@ -17,7 +17,8 @@ fn load(name: &str) -> Option<Scene> {
     let text = std::fs::read_to_string(&path).unwrap();
     if text.contains("obj =") && std::env::var_os(AssetRoots::VARIABLE).is_none() {
         // Past the test harness, which would keep it to itself.
-        writeln!(std::io::stderr(), "SKIP {name}: needs assets; set {}", AssetRoots::VARIABLE).unwrap();
+        let notice = format!("SKIP {name}: needs assets; set {}\n", AssetRoots::VARIABLE);
+        std::io::stderr().write_all(notice.as_bytes()).unwrap();
         return None;
     }
     Some(Scene::load(&path).unwrap_or_else(|e| panic!("{e}")))

@@ -240,8 +240,12 @@ fn concave_quads_keep_their_area() {
 }
 
 proptest! {
-    // 256 cases, new seeds in every run: proptest prints the failing text and its seed.
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    // 256 cases, seed 1, so that a run repeats; PROPTEST_CASES asks for more.
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn damaged_assets_never_panic(
