@@ -1,1 +1,36 @@
-//! The photonstream command: starts and watches the processes, one subcommand a task.
+//! Turns a command line into processes, pictures and reports: the `photonstream` command.
+//!
+//! One executable holds all roles. `photonstream run` starts the simulator and each renderer as processes of their own
+//! (of the same executable) and watches them; every other subcommand does one task. `cli` lists the subcommands,
+//! `commands` has a file for each, `supervise` keeps child processes alive.
+#![forbid(unsafe_code)]
+
+mod cli;
+mod commands;
+mod error;
+mod exit;
+mod follow;
+mod log;
+mod output;
+mod owned;
+mod pictures;
+mod progress;
+mod signals;
+mod supervise;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Runs the command line of this process to its end.
+pub fn main() -> ExitCode {
+    let program = cli::Program::parse();
+    log::start(&program.global);
+    match commands::dispatch(program) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let code = error.exit_code();
+            log::report(&error);
+            ExitCode::from(code)
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! Turns a scene into a simulator and renderers, each a process of its own, watched until their work is done.
+
+use super::render::{remove_channel, simulator, verbosity};
+use crate::{
+    cli::Global,
+    error::LauncherError,
+    follow, output,
+    pictures::Look,
+    supervise::{BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Supervisor, find_plug_in},
+};
+use photonstream_protocol::ChannelName;
+use photonstream_scene::SceneConfig;
+use photonstream_simulator::cli::Overrides;
+use serde::Serialize;
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+    time::{Duration, Instant, SystemTime},
+};
+
+/// Arguments of `photonstream run`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+A renderer NAME that is not built in (cpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
+called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V].
+What crashes is started again. Several renderers write to folders of their own in DIR.
+Ctrl-C ends all processes in order, a second one at once.
+
+Examples:
+  photonstream run configs/cornell-box.toml
+  photonstream run room.toml --renderer cpu --renderer mine --headless --frames 20 --out film
+
+JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers\": [ { \"name\", \"folder\", \"pictures\": [paths],
+  \"restarts\", \"failed\" } ] }")]
+pub(crate) struct Args {
+    /// Scene [default: the built-in Cornell box]
+    config: Option<PathBuf>,
+    /// Renderer, built in (cpu) or a plug-in; may be given several times
+    #[arg(long = "renderer", value_name = "NAME", default_value = "cpu")]
+    renderers: Vec<String>,
+    /// Without a window (this build has none)
+    #[arg(long)]
+    headless: bool,
+    /// End after so many pictures of each renderer [default: one, once the light has converged]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Folder of the pictures
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Channel to publish on [default: one of its own]
+    #[arg(long)]
+    channel: Option<ChannelName>,
+    #[command(flatten)]
+    look: Look,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+#[derive(Serialize)]
+struct Report {
+    scene: String,
+    channel: String,
+    total_s: f64,
+    simulator_restarts: u32,
+    renderers: Vec<Renderer>,
+}
+
+#[derive(Serialize)]
+struct Renderer {
+    name: String,
+    folder: PathBuf,
+    pictures: Vec<PathBuf>,
+    restarts: u32,
+    failed: bool,
+}
+
+/// Time between two looks at the children and the channel.
+const LOOK: Duration = Duration::from_millis(50);
+/// So long may renderers take to finish after the simulation has ended in order.
+const LAST_PICTURE: Duration = Duration::from_secs(30);
+
+pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
+    let begun = (Instant::now(), SystemTime::now());
+    let built_in = super::default_run::BuiltInScene::new_if(args.config.is_none())?;
+    let config = match (&args.config, &built_in) {
+        (Some(config), _) => config.as_path(),
+        (None, Some(scene)) => scene.path(),
+        (None, None) => unreachable!("invariant: the built-in scene stands in for a missing one"),
+    };
+    let channel = match &args.channel {
+        Some(channel) => channel.clone(),
+        None => format!("run-{}", std::process::id()).parse()?,
+    };
+    // Mistakes are told at once, by this process, before anything is started.
+    let scene = scene_name(config, &SceneConfig::from_file(config)?);
+    let folders = folders(&args.out, &args.renderers);
+    let mut roles = vec![simulator(config, &channel, &args.overrides, None, global)];
+    for (name, folder) in args.renderers.iter().zip(&folders) {
+        roles.push(renderer(name, folder, &channel, args, global)?);
+    }
+    for folder in &folders {
+        std::fs::create_dir_all(folder).map_err(|e| LauncherError::io("create folder", folder, e))?;
+    }
+    if !args.headless {
+        tracing::info!(
+            "no window renderer in this build: running without a window, pictures go to {}",
+            args.out.display()
+        );
+    }
+    let output = if global.json { ChildOutput::Aside } else { ChildOutput::Through };
+    let mut supervisor = Supervisor::new(output)?;
+    let result = roles.into_iter().try_for_each(|role| supervisor.start(role));
+    let result = result.and_then(|()| watch(&mut supervisor, &channel));
+    supervisor.end();
+    let left_over = supervisor.fates(Kind::Simulator).iter().any(|fate| fate.crashed);
+    if args.channel.is_none() || left_over {
+        remove_channel(&channel);
+    }
+    result?;
+    let fates = supervisor.fates(Kind::Renderer);
+    let renderers = args.renderers.iter().zip(folders).zip(fates).map(|((name, folder), fate)| Renderer {
+        name: name.clone(),
+        pictures: pictures_in(&folder, begun.1),
+        folder,
+        restarts: fate.restarts,
+        failed: fate.failed,
+    });
+    let report = Report {
+        scene,
+        channel: channel.to_string(),
+        total_s: begun.0.elapsed().as_secs_f64(),
+        simulator_restarts: supervisor.fates(Kind::Simulator).iter().map(|fate| fate.restarts).sum(),
+        renderers: renderers.collect(),
+    };
+    output::report(global.json, &report, text)?;
+    supervisor.take_failure().map_or(Ok(()), Err)
+}
+
+/// Until all renderers are done, or the simulation and then they.
+fn watch(supervisor: &mut Supervisor, channel: &ChannelName) -> Result<(), LauncherError> {
+    let light = follow::Light::start();
+    let mut subscriber = None;
+    while !supervisor.is_over(Kind::Renderer) {
+        if supervisor.is_over(Kind::Simulator) {
+            tracing::info!("the simulation was ended; waiting for the last pictures");
+            return last_pictures(supervisor);
+        }
+        supervisor.attend(LOOK)?;
+        // Only for the bar: what is wrong with the channel is the renderers' to say.
+        if let Ok(Some(frame)) = follow::poll(&mut subscriber, channel) {
+            light.show(frame);
+        }
+    }
+    Ok(())
+}
+
+fn last_pictures(supervisor: &mut Supervisor) -> Result<(), LauncherError> {
+    let deadline = Instant::now() + LAST_PICTURE;
+    while !supervisor.is_over(Kind::Renderer) && Instant::now() < deadline {
+        supervisor.attend(LOOK)?;
+    }
+    Ok(())
+}
+
+fn scene_name(config: &Path, parsed: &SceneConfig) -> String {
+    let stem = || config.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    parsed.name.clone().unwrap_or_else(stem)
+}
+
+/// A renderer as a process.
+fn renderer(
+    name: &str,
+    folder: &Path,
+    channel: &ChannelName,
+    args: &Args,
+    global: &Global,
+) -> Result<Role, LauncherError> {
+    let mut arguments: Vec<OsString> = Vec::new();
+    let plug_in = if BUILT_IN_RENDERERS.contains(&name) {
+        arguments.extend(["renderer".into(), name.into()]);
+        arguments.extend(verbosity(global));
+        None
+    } else {
+        Some(find_plug_in(name)?)
+    };
+    arguments.extend(["--channel".into(), channel.as_str().into(), "--out".into(), folder.into()]);
+    arguments.push("--headless".into());
+    arguments.extend(args.frames.map(|n| format!("--frames={n}").into()));
+    arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
+    Ok(Role { name: name.to_owned(), kind: Kind::Renderer, plug_in, arguments })
+}
+
+/// Where each renderer writes: `out`, or with several of them `out/NAME`, `out/NAME-2` …
+fn folders(out: &Path, renderers: &[String]) -> Vec<PathBuf> {
+    if renderers.len() == 1 {
+        return vec![out.to_owned()];
+    }
+    let folder = |(i, name): (usize, &String)| match renderers[..i].iter().filter(|n| *n == name).count() {
+        0 => out.join(name),
+        n => out.join(format!("{name}-{}", n + 1)),
+    };
+    renderers.iter().enumerate().map(folder).collect()
+}
+
+/// Picture files in `folder` that were written since `begun`, by name.
+fn pictures_in(folder: &Path, begun: SystemTime) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let is_new = |path: &PathBuf| {
+        let end = path.extension().and_then(|e| e.to_str());
+        // Some file systems count time in coarse steps.
+        let since = begun - Duration::from_millis(20);
+        matches!(end, Some("exr" | "png" | "ppm"))
+            && path.metadata().and_then(|m| m.modified()).is_ok_and(|time| time >= since)
+    };
+    let mut pictures: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_new).collect();
+    pictures.sort();
+    pictures
+}
+
+/// So many names of pictures are listed; of more, the first and the last.
+const LISTED: usize = 6;
+
+fn text(report: &Report) -> String {
+    let mut out = String::new();
+    for renderer in &report.renderers {
+        let names: Vec<_> = renderer.pictures.iter().map(|path| path.display().to_string()).collect();
+        if names.len() <= LISTED {
+            out.extend(names.iter().map(|name| format!("{name}\n")));
+        } else {
+            out.push_str(&format!("{} … {} ({} files)\n", names[0], names[names.len() - 1], names.len()));
+        }
+    }
+    let restarts: u32 = report.renderers.iter().map(|r| r.restarts).sum();
+    out.push_str(&format!("{}: {:.2} s", report.scene, report.total_s));
+    if report.simulator_restarts + restarts > 0 {
+        out.push_str(&format!("; restarts: simulator {}, renderers {restarts}", report.simulator_restarts));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_renderers_have_folders_of_their_own() {
+        let names = |list: &[&str]| list.iter().map(|&n| n.to_owned()).collect::<Vec<_>>();
+        assert_eq!(folders(Path::new("out"), &names(&["cpu"])), [Path::new("out")]);
+        let several = folders(Path::new("o"), &names(&["cpu", "mine", "cpu", "cpu"]));
+        assert_eq!(several, ["o/cpu", "o/mine", "o/cpu-2", "o/cpu-3"].map(PathBuf::from));
+    }
+}

@@ -1,0 +1,130 @@
+//! Turns everything that can end a command early into one message and one exit code.
+
+use crate::exit;
+use photonstream_evaluation::MetricsError;
+use photonstream_film::FilmError;
+use photonstream_protocol::ProtocolError;
+use photonstream_renderer_cpu::RenderError;
+use photonstream_scene::SceneError;
+use photonstream_simulator::error::SimulatorError;
+use std::{io, path::PathBuf};
+
+/// Why a command did not do what it was asked for.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LauncherError {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The channel.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
+    /// The simulator.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// The renderer.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A picture.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// A comparison.
+    #[error(transparent)]
+    Metrics(#[from] MetricsError),
+    /// Arguments that contradict each other.
+    #[error("{0}")]
+    Usage(String),
+    /// A renderer that is neither built in nor found.
+    #[error(
+        "no renderer is called \"{name}\": built in is {built_in}; looked for the plug-in {file} in {looked}; \
+         install it there or choose another --renderer"
+    )]
+    UnknownRenderer {
+        /// The name given.
+        name: String,
+        /// Names of the renderers of this build.
+        built_in: String,
+        /// File name of the plug-in.
+        file: String,
+        /// Folders, in order.
+        looked: String,
+    },
+    /// A child process that failed for good.
+    #[error("{name} {how}{}", tail(.said))]
+    Child {
+        /// What it is called.
+        name: String,
+        /// How it ended, and how often it was tried.
+        how: String,
+        /// Its last words.
+        said: Vec<String>,
+        /// The exit code to pass on.
+        code: u8,
+    },
+    /// The simulation ended before it was of any use.
+    #[error("the simulator of channel '{channel}' ended before {what}; start it again")]
+    SimulatorEnded {
+        /// The channel.
+        channel: String,
+        /// What was waited for.
+        what: &'static str,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// Results could not be written.
+    #[error("cannot write results: {0}")]
+    Output(io::Error),
+    /// A signal.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+fn tail(said: &[String]) -> String {
+    match said {
+        [] => "; it said nothing on stderr".into(),
+        [line] => format!(": {line}"),
+        lines => format!("; its last lines:\n    {}", lines.join("\n    ")),
+    }
+}
+
+impl LauncherError {
+    pub(crate) fn io(action: &'static str, path: impl Into<PathBuf>, source: io::Error) -> Self {
+        Self::Io { action, path: path.into(), source }
+    }
+
+    /// The exit code that goes with it.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Simulator(SimulatorError::Scene(_)) => exit::CONFIG,
+            Self::Render(RenderError::Scene { .. }) => exit::CONFIG,
+            Self::Protocol(error)
+            | Self::Simulator(SimulatorError::Protocol(error))
+            | Self::Render(RenderError::Protocol(error)) => of_protocol(error),
+            Self::Render(RenderError::Cancelled) | Self::Interrupted => exit::INTERRUPTED,
+            Self::Usage(_) | Self::UnknownRenderer { .. } => exit::USAGE,
+            Self::Child { code, .. } => *code,
+            Self::SimulatorEnded { .. } => exit::CHILD,
+            _ => exit::FAILED,
+        }
+    }
+}
+
+fn of_protocol(error: &ProtocolError) -> u8 {
+    match error {
+        ProtocolError::NotCreated { .. }
+        | ProtocolError::NotInitialised { .. }
+        | ProtocolError::ChannelBusy { .. }
+        | ProtocolError::PublisherGone { .. }
+        | ProtocolError::TimedOut { .. } => exit::CHANNEL,
+        ProtocolError::InvalidName { .. } => exit::USAGE,
+        ProtocolError::Cancelled { .. } => exit::INTERRUPTED,
+        _ => exit::FAILED,
+    }
+}

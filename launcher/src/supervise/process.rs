@@ -1,0 +1,161 @@
+//! Turns a role into a process that is started, seen to end, and judged.
+
+use super::{
+    backoff::{Backoff, Verdict},
+    role::{Kind, Role},
+    voice::{ChildOutput, Voice},
+};
+use crate::{error::LauncherError, exit};
+use rustix::process::{Pid, Signal, kill_process};
+use std::{
+    os::unix::process::ExitStatusExt,
+    process::{Child, ExitStatus},
+    time::{Duration, Instant},
+};
+
+/// Where a process stands.
+pub(super) enum State {
+    /// It runs.
+    Running { child: Child, voice: Voice, since: Instant },
+    /// It failed, and will be started again then.
+    Waiting { until: Instant },
+    /// It did what it was for.
+    Done,
+    /// It failed for good.
+    Failed,
+}
+
+/// A role and its present process.
+pub(super) struct Process {
+    pub(super) role: Role,
+    pub(super) state: State,
+    pub(super) restarts: u32,
+    /// It ended otherwise than in order at least once: it may have left something behind.
+    pub(super) crashed: bool,
+    backoff: Backoff,
+}
+
+impl Process {
+    pub(super) fn start(role: Role, output: ChildOutput) -> Result<Self, LauncherError> {
+        let state = spawn(&role, output)?;
+        Ok(Self { role, state, restarts: 0, crashed: false, backoff: Backoff::default() })
+    }
+
+    /// Looks whether it has ended. The error is that of a process that failed for good.
+    pub(super) fn look(&mut self) -> Result<(), LauncherError> {
+        let State::Running { child, since, .. } = &mut self.state else { return Ok(()) };
+        let status = child.try_wait().map_err(|e| LauncherError::io("wait for", &self.role.name, e))?;
+        let Some(status) = status else { return Ok(()) };
+        let uptime = since.elapsed();
+        let State::Running { voice, .. } = std::mem::replace(&mut self.state, State::Done) else {
+            unreachable!("invariant: it was running a moment ago")
+        };
+        if status.success() {
+            return Ok(());
+        }
+        self.crashed = true;
+        self.judge(status, uptime, voice.last_words())
+    }
+
+    fn judge(
+        &mut self,
+        status: ExitStatus,
+        uptime: Duration,
+        said: Vec<String>,
+    ) -> Result<(), LauncherError> {
+        let name = &self.role.name;
+        let how = describe(status);
+        let code = status.code().and_then(|code| u8::try_from(code).ok());
+        // What is wrong with the scene, the channel or the command line is still wrong the next time.
+        let final_code = code.filter(|c| {
+            self.role.plug_in.is_none() && [exit::USAGE, exit::CONFIG, exit::CHANNEL].contains(c)
+        });
+        if let Some(code) = final_code {
+            self.state = State::Failed;
+            return Err(LauncherError::Child { name: name.clone(), how: "cannot run".into(), said, code });
+        }
+        let complaint = status.code().map(|code| format!("{code} {}", said.join("\n")));
+        match self.backoff.failed(uptime, complaint) {
+            Verdict::Retry(pause) => {
+                let words = said.last().map_or_else(String::new, |line| format!(" ({line})"));
+                tracing::warn!("{name} {how} after {:.1} s{words}; starting it again", uptime.as_secs_f64());
+                self.state = State::Waiting { until: Instant::now() + pause };
+                Ok(())
+            }
+            Verdict::GiveUp => {
+                self.state = State::Failed;
+                let how = format!("{how}, after {} restarts", self.restarts);
+                Err(LauncherError::Child { name: name.clone(), how, said, code: exit::CHILD })
+            }
+        }
+    }
+
+    /// Starts it again if the time has come.
+    pub(super) fn start_if_due(&mut self, output: ChildOutput) -> Result<(), LauncherError> {
+        if matches!(self.state, State::Waiting { until } if until <= Instant::now()) {
+            self.state = spawn(&self.role, output)?;
+            self.restarts += 1;
+        }
+        Ok(())
+    }
+
+    /// Asks it to end, or ends it; one that waits for its restart waits no more.
+    pub(super) fn signal(&mut self, signal: Signal) {
+        match &self.state {
+            State::Running { child, .. } => {
+                let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+                if let Some(pid) = pid {
+                    // It may have ended a moment ago; until it is waited for, its number stays its own.
+                    let _ = kill_process(pid, signal);
+                }
+            }
+            State::Waiting { .. } => self.state = State::Done,
+            State::Done | State::Failed => {}
+        }
+    }
+
+    /// Collects it without judging, at the end of all.
+    pub(super) fn collect(&mut self) {
+        if let State::Running { child, .. } = &mut self.state
+            && let Ok(Some(status)) = child.try_wait()
+        {
+            self.crashed |= !status.success();
+            let State::Running { voice, .. } = std::mem::replace(&mut self.state, State::Done) else {
+                return;
+            };
+            // The last lines are printed while this waits.
+            let _ = voice.last_words();
+        }
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        matches!(self.state, State::Running { .. })
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        matches!(self.state, State::Done | State::Failed)
+    }
+
+    pub(super) fn is(&self, kind: Kind) -> bool {
+        self.role.kind == kind
+    }
+}
+
+fn spawn(role: &Role, output: ChildOutput) -> Result<State, LauncherError> {
+    let mut child = role.command()?.spawn().map_err(|e| LauncherError::io("start", &role.name, e))?;
+    let voice = Voice::listen(&role.name, (child.stdout.take(), child.stderr.take()), output);
+    tracing::debug!(pid = child.id(), "{} started", role.name);
+    Ok(State::Running { child, voice, since: Instant::now() })
+}
+
+fn describe(status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(101), _) => "panicked (a bug: please report it)".into(),
+        (Some(code), _) => format!("failed with exit code {code}"),
+        (None, Some(signal)) => {
+            let name = signal_hook::low_level::signal_name(signal).unwrap_or("unknown");
+            format!("was ended by signal {signal} ({name})")
+        }
+        (None, None) => "ended in an unknown way".into(),
+    }
+}
