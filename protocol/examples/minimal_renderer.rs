@@ -47,10 +47,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let flux_w =
             frame.vsls.iter().fold([0.0; 3], |sum, vsl| [0, 1, 2].map(|c| sum[c] + f64::from(vsl.flux[c])));
         let (number, lights) = (frame.frame, frame.vsls.len());
-        writeln!(
-            std::io::stdout(),
-            r#"{{"frame":{number},"vsls":{lights},"changed_chunks":{changed},"flux_w":{flux_w:?}}}"#
-        )?;
+        let line =
+            format!(r#""frame":{number},"vsls":{lights},"changed_chunks":{changed},"flux_w":{flux_w:?}"#);
+        writeln!(std::io::stdout(), "{{{line}}}")?;
         if let Some(path) = value("--out") {
             std::fs::write(path, picture(frame))?;
         }
