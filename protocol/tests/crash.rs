@@ -262,6 +262,7 @@ fn a_stopped_and_then_killed_writer_is_told_apart() {
     check(late.frame().unwrap());
     assert!(late.frame().unwrap().frame >= last);
     assert!(matches!(late.liveness(), Liveness::Gone { .. }));
+    assert_eq!(clean_in(&runtime).unwrap()[0].segments.len(), 1);
 }
 
 /// 40 rounds of four processes that start at once: exactly one owns the channel, none fails otherwise.
@@ -277,6 +278,7 @@ fn one_of_several_writers_wins() {
         }
         assert_eq!(owners, 1, "round {round}");
     }
+    clean_in(&Runtime::at(root.path())).unwrap();
 }
 
 /// 1 000 restarts in one process, each with a reader: at most one segment at any time, as many open files as before.
