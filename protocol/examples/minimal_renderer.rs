@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             format!(r#""frame":{number},"vsls":{lights},"changed_chunks":{changed},"flux_w":{flux_w:?}"#);
         writeln!(std::io::stdout(), "{{{line}}}")?;
         if let Some(path) = value("--out") {
-            std::fs::write(path, picture(frame))?;
+            std::fs::write(std::path::Path::new(path).join("above.ppm"), picture(frame))?;
         }
         shown += 1;
     }
