@@ -138,6 +138,14 @@ pub fn clean_in(runtime: &Runtime) -> Result<Vec<Cleaned>, ProtocolError> {
     Ok(cleaned)
 }
 
+/// Removes what is left of one channel of the environment's runtime folder.
+///
+/// # Errors
+/// `ChannelBusy` for a live channel, `NotCreated` where there is none, `Io`, `Insecure`.
+pub fn clean_one(channel: &ChannelName) -> Result<Cleaned, ProtocolError> {
+    clean_channel(Runtime::from_env().open_channel(channel)?)
+}
+
 fn clean_channel(dir: ChannelDir) -> Result<Cleaned, ProtocolError> {
     let claim = Claim::take(dir)?;
     let segments = claim.recover()?;

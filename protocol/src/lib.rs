@@ -36,7 +36,7 @@ mod subscriber;
 mod words;
 mod writer_segment;
 
-pub use channels::{ChannelStatus, Cleaned, channels, channels_in, clean, clean_in};
+pub use channels::{ChannelStatus, Cleaned, channels, channels_in, clean, clean_in, clean_one};
 pub use chunks::{CHUNK_RECORDS, ChunkSet};
 pub use control::{ControlClient, ControlServer, Incoming, Replier, Reply, Request};
 pub use error::ProtocolError;
