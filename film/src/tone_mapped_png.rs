@@ -17,6 +17,8 @@ pub enum Display {
     },
     /// Values in [0, 1] to be shown as they are: albedo, normals, identities.
     Data,
+    /// Values from 0 to whatever the largest one is, which becomes white: distances.
+    Scaled,
 }
 
 impl Film {
@@ -31,6 +33,10 @@ impl Film {
         let (exposure_ev, tone_map) = match display {
             Display::Radiance { exposure_ev, tone_map } => (exposure_ev, tone_map),
             Display::Data => (0.0, ToneMap::Linear),
+            Display::Scaled => {
+                let largest = pixels.iter().map(|p| p.max_element()).fold(f32::MIN_POSITIVE, f32::max);
+                (-largest.log2(), ToneMap::Linear)
+            }
         };
         let rgb: Vec<u8> = pixels.iter().flat_map(|&p| to_srgb8(tone_map.apply(p, exposure_ev))).collect();
         let mut png = Vec::new();

@@ -132,7 +132,12 @@ fn tell_liveness(told: &mut Option<String>, args: &Args, liveness: &Liveness) {
     let channel = &args.channel;
     match liveness {
         Liveness::Gone { .. } => {
-            tell(told, format!("channel {channel}: the simulator has ended; keeping its last frame, waiting for the next run"));
+            tell(
+                told,
+                format!(
+                    "channel {channel}: the simulator has ended; keeping its last frame, waiting for the next run"
+                ),
+            );
         }
         Liveness::Stalled { .. } => {
             tell(told, format!("channel {channel}: the simulator does not respond; keeping its last frame"));

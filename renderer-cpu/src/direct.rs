@@ -12,7 +12,13 @@ const SHADOW_REACH: f32 = 1.0 - 8.0 * f32::EPSILON;
 /// Irradiance in W m⁻² from `light` at `surface`, through the point of the light that `u` chooses; the number of rays
 /// traced is added to `rays`.
 #[inline]
-pub(crate) fn irradiance(scene: &Scene, light: &Light, surface: &Surface, u: [f32; 2], rays: &mut u64) -> Vec3 {
+pub(crate) fn irradiance(
+    scene: &Scene,
+    light: &Light,
+    surface: &Surface,
+    u: [f32; 2],
+    rays: &mut u64,
+) -> Vec3 {
     let Some(Illumination { wi, distance, irradiance }) = light.shape.illuminate(surface.ray_origin, u)
     else {
         return Vec3::ZERO;

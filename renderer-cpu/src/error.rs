@@ -39,7 +39,9 @@ pub enum RenderError {
         expected: &'static str,
     },
     /// A published light is unusable.
-    #[error("light {index}: {field}: found {found}, expected {expected}; simulator and renderer differ, restart both")]
+    #[error(
+        "light {index}: {field}: found {found}, expected {expected}; simulator and renderer differ, restart both"
+    )]
     Light {
         /// Its index.
         index: usize,

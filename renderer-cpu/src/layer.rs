@@ -52,12 +52,19 @@ impl LayerKind {
         }
     }
 
-    /// How the layer becomes display colours: what is light or has a unit is exposed and tone mapped.
+    /// How the layer becomes display colours: light is exposed and tone mapped, distances are scaled, the rest is
+    /// shown as it is.
     pub fn display(self, settings: &RenderSettings) -> Display {
         match self {
-            Self::Full | Self::Direct | Self::Indirect | Self::Flux | Self::Depth => {
+            Self::Full | Self::Direct | Self::Indirect => {
                 Display::Radiance { exposure_ev: settings.exposure_ev, tone_map: settings.tone_map }
             }
+            // As bright as the radiance it stands for: radiosity/π.
+            Self::Flux => {
+                let exposure_ev = settings.exposure_ev - core::f32::consts::PI.log2();
+                Display::Radiance { exposure_ev, tone_map: settings.tone_map }
+            }
+            Self::Depth => Display::Scaled,
             Self::Albedo | Self::Normal | Self::Vsl => Display::Data,
         }
     }

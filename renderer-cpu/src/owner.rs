@@ -100,8 +100,8 @@ mod tests {
         assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::Y, 1)), Some(0));
         assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::NEG_Y, 1)), None);
         assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::NEG_Y, 2)), None);
-        // No compatible normal: the nearest of the side.
-        assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::new(0.8, -0.6, 0.0), 0)), Some(2));
+        // No compatible normal (cosines 0.4, 0.17 and below 0): the nearest of the side.
+        assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::new(0.3, -0.4, 0.75f32.sqrt()), 0)), Some(1));
     }
 
     #[test]

@@ -90,16 +90,25 @@ fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
         0 => LightShape::Point { position },
         1 => {
             let (versine_inner, versine_outer) = (record.versine_inner, record.versine_outer);
-            if !(versine_outer > 0.0 && (0.0..=versine_outer).contains(&versine_inner) && versine_outer <= 2.0) {
+            if !(versine_outer > 0.0
+                && (0.0..=versine_outer).contains(&versine_inner)
+                && versine_outer <= 2.0)
+            {
                 let found = format!("{versine_inner} and {versine_outer}");
-                return Err(wrong("versine_inner, versine_outer", found, "0 <= inner <= outer, 0 < outer <= 2"));
+                return Err(wrong(
+                    "versine_inner, versine_outer",
+                    found,
+                    "0 <= inner <= outer, 0 < outer <= 2",
+                ));
             }
             LightShape::Spot { position, direction: unit()?, versine_inner, versine_outer }
         }
         2 => LightShape::Directional { direction: unit()? },
         3 => LightShape::Parallelogram { corner: position, edge_u, edge_v },
         4 => LightShape::Triangle { corner: position, edge_u, edge_v },
-        kind => return Err(wrong("kind", kind.to_string(), "0 to 4; this renderer is older than the simulator")),
+        kind => {
+            return Err(wrong("kind", kind.to_string(), "0 to 4; this renderer is older than the simulator"));
+        }
     };
     let power = finite("power", record.power)?;
     if power.min_element() < 0.0 {

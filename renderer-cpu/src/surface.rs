@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 use photonstream_scene::{
-    Scene,
+    Scene, Side,
     bvh::{Hit, Ray},
-    Side,
 };
 use photonstream_shading::surface;
 
