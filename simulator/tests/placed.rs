@@ -51,13 +51,13 @@ fn areas_sum_to_the_surface() {
 #[test]
 fn thinning_equals_the_naive_algorithm() {
     let scene = objects("scale = [1, 2, 1]");
-    let keep = Placement::with(&scene, 150, 7, 0.9, 1.4);
+    let keep = Placement::with(&scene, 150, 7, 1.0, 1.4);
     assert_eq!(keep.vsls.len(), 150);
     for (surface, range) in &keep.surfaces {
         let kept = &keep.vsls[range.start as usize..range.end as usize];
         let wanted = kept.len();
-        // The points before thinning are those that a larger share would draw first.
-        let all = Placement::with(&scene, 4000, 7, 0.9, 1.0);
+        // The points before thinning are those that a larger share would draw first, at the same scale.
+        let all = Placement::with(&scene, 4000, 7, 1.0, 1.0);
         let (_, all_range) = all.surfaces.iter().find(|(s, _)| s == surface).unwrap();
         let count = (wanted as f64 * 1.4).ceil() as usize;
         let mut points: Vec<Vsl> = all.vsls[all_range.start as usize..][..count].to_vec();

