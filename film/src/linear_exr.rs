@@ -29,8 +29,8 @@ impl Film {
                 channels.push(exr_rs::AnyChannel::new(name.as_str(), exr_rs::FlatSamples::F32(values)));
             }
         }
-        let mut attributes = exr_rs::LayerAttributes::default();
-        attributes.software_name = self.metadata.software.as_deref().map(to_text);
+        let software_name = self.metadata.software.as_deref().map(to_text);
+        let mut attributes = exr_rs::LayerAttributes { software_name, ..Default::default() };
         for (name, text) in
             self.metadata.to_texts().into_iter().chain([(LAYER_ATTRIBUTE, first.name.clone())])
         {

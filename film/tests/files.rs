@@ -1,4 +1,5 @@
 //! Turns pictures into files and back: values, names, metadata, refusals, atomicity.
+#![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
 use photonstream_film::{Display, Film, FilmError, Metadata};

@@ -1,6 +1,6 @@
 //! Turns published virtual surface lights into pictures on the CPU, and scenes into path-traced reference pictures.
 //!
-//! [`render`] evaluates the sum of METHODS §2 over a [`VslSet`]; [`reference`] is the truth that it is measured
+//! [`render`] evaluates the sum of METHODS §2 over a [`VslSet`]; [`reference()`] is the truth that it is measured
 //! against. Both use the scene's own rays and the maths of `photonstream-shading`, and nothing else in common.
 //! [`attach::run`] is the renderer process: it follows a simulator's channel and writes pictures.
 #![forbid(unsafe_code)]

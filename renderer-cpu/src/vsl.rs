@@ -90,7 +90,8 @@ fn check(index: usize, vsl: &Vsl) -> Result<(), RenderError> {
         return wrong("position", vsl.position.to_string(), "finite metres");
     }
     // The rounding of three components stays far below this.
-    if !((vsl.normal.length_squared() - 1.0).abs() < 1e-4) {
+    let is_unit = (vsl.normal.length_squared() - 1.0).abs() < 1e-4;
+    if !is_unit {
         return wrong("normal", vsl.normal.to_string(), "unit length");
     }
     if !(vsl.flux.is_finite() && vsl.flux.min_element() >= 0.0) {

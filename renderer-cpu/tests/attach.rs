@@ -1,5 +1,6 @@
 //! Turns published frames into pictures through the renderer's own program: as many as asked for, or the last one
 //! when the channel closes.
+#![allow(clippy::unwrap_used)]
 
 mod scenes;
 

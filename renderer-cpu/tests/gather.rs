@@ -1,4 +1,5 @@
 //! Turns single virtual surface lights into pictures and compares them with the sum done by hand.
+#![allow(clippy::unwrap_used)]
 
 mod scenes;
 

@@ -1,4 +1,5 @@
 //! Turns options into pictures or clear refusals, and checks what the layers hold.
+#![allow(clippy::unwrap_used)]
 
 mod scenes;
 

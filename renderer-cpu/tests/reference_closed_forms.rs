@@ -1,4 +1,5 @@
 //! Turns scenes of known light into reference pictures and compares the two.
+#![allow(clippy::unwrap_used)]
 
 mod scenes;
 

@@ -1,4 +1,5 @@
 //! Turns pairs of reference pictures into a check of the noise that they state of themselves.
+#![allow(clippy::unwrap_used)]
 
 mod scenes;
 

@@ -4,7 +4,7 @@ use crate::{LayerKind, RenderError};
 use photonstream_scene::RenderSettings;
 use std::time::Duration;
 
-/// How [`crate::reference`] makes a picture.
+/// How [`crate::reference()`] makes a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceOptions {
     /// Picture width in pixels.
