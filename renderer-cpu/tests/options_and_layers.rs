@@ -103,7 +103,7 @@ fn progress_reaches_one_and_a_flag_stops() {
     let note = |share: f64| shares.lock().unwrap().push(share);
     let watch = Watch { progress: Some(&note), cancelled: Some(&cancelled) };
     render(&scene, &vsls, &options(100, 80, &[LayerKind::Full]), watch).unwrap();
-    assert!(shares.lock().unwrap().iter().any(|s| *s == 1.0));
+    assert!(shares.lock().unwrap().contains(&1.0));
     shares.lock().unwrap().clear();
     let defaults = ReferenceOptions::from_settings(&RenderSettings::default(), Stop::Samples(16));
     let traced = ReferenceOptions { width: 40, height: 30, ..defaults };
