@@ -216,3 +216,58 @@ fn signals_and_moved_objects_end_it_clearly() {
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).contains("object \"sphere\" has moved"), "{}", stderr(&output));
 }
+
+const CHILD: &str = "PHOTONSTREAM_TEST_SIMULATOR";
+
+/// Not a test of its own: the process that the next test kills. It publishes one frame of the given power.
+#[test]
+fn simulator_child() {
+    let Ok(root) = std::env::var(CHILD) else { return };
+    let power = std::env::var("PHOTONSTREAM_TEST_POWER").unwrap().parse().unwrap();
+    let mut simulator = Simulator::start(Path::new(&root));
+    simulator.publish(power, false);
+    // Killed long before; ends by itself if the test is.
+    std::thread::sleep(Duration::from_secs(60));
+}
+
+#[test]
+fn a_killed_simulator_is_waited_for_and_its_successor_followed() {
+    let root = tempfile::tempdir().unwrap();
+    // Apart from the runtime folder, in which `clean` takes every folder for a channel's.
+    let pictures = tempfile::tempdir().unwrap();
+    let out = pictures.path().join("out");
+    let simulate = |power: &str| {
+        Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "simulator_child"])
+            .env(CHILD, root.path())
+            .env("PHOTONSTREAM_TEST_POWER", power)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap()
+    };
+    let mut renderer = renderer(root.path(), &out, &["--frames", "2"]);
+    let mut first = simulate("10");
+    wait_for(&out.join("frame-0001.png"));
+    first.kill().unwrap();
+    first.wait().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(renderer.try_wait().unwrap().is_none(), "the renderer ended with its simulator");
+    let mut second = simulate("30");
+    let output = ended(renderer);
+    second.kill().unwrap();
+    second.wait().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("the simulator has ended; keeping its last frame"),
+        "{}",
+        stderr(&output)
+    );
+    let mean = |n: u32| {
+        let film = Film::read_exr(&out.join(format!("frame-000{n}.exr"))).unwrap();
+        scenes::mean(&film.layers()[0].pixels)
+    };
+    assert!((mean(2) / mean(1) - 3.0).abs() < 1e-5, "{} after {}", mean(2), mean(1));
+    // What the killed simulator left in shared memory.
+    photonstream_protocol::clean_in(&Runtime::at(root.path())).unwrap();
+}
