@@ -1,4 +1,6 @@
-//! Turns the words of records into a verdict: every float in them is finite.
+//! Turns the words of records into a verdict, every float in them is finite, on their way from or into a segment.
+
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::ProtocolError;
 use crate::record::{ArrayKind, Field, FieldType};
@@ -50,35 +52,83 @@ const fn masks(fields: &[Field]) -> ExponentMasks {
     masks
 }
 
-static VSL: ExponentMasks = masks(ArrayKind::Vsl.fields());
-static OBJECT: ExponentMasks = masks(ArrayKind::Object.fields());
-static LIGHT: ExponentMasks = masks(ArrayKind::Light.fields());
-static STATISTICS: ExponentMasks = masks(ArrayKind::Statistics.fields());
+const VSL: ExponentMasks = masks(ArrayKind::Vsl.fields());
+const OBJECT: ExponentMasks = masks(ArrayKind::Object.fields());
+const LIGHT: ExponentMasks = masks(ArrayKind::Light.fields());
+const STATISTICS: ExponentMasks = masks(ArrayKind::Statistics.fields());
+const TEXT: ExponentMasks = masks(ArrayKind::SceneText.fields());
 
-fn all_finite<const WORDS: usize>(words: &[u64], masks: &ExponentMasks) -> bool {
-    let mut lanes = [0u64; WORDS];
-    for record in words.as_chunks::<WORDS>().0 {
-        for k in 0..WORDS {
-            lanes[k] |= (record[k] & masks.mask[k]).wrapping_add(masks.unit[k]);
+impl ExponentMasks {
+    /// A value with a bit of `SIGNS` where a float of the record is not finite.
+    #[inline(always)]
+    fn carries<const WORDS: usize>(&self, record: &[u64; WORDS]) -> u64 {
+        let mut carries = 0;
+        for ((word, mask), unit) in record.iter().zip(&self.mask).zip(&self.unit) {
+            // Words without floats vanish here: masks are constants.
+            if *mask != 0 {
+                carries |= (word & mask).wrapping_add(*unit);
+            }
         }
+        carries
     }
-    lanes.iter().fold(0, |all, lane| all | lane) & SIGNS == 0
+
+    fn all_finite<const WORDS: usize>(&self, words: &[u64]) -> bool {
+        let carries = words.as_chunks::<WORDS>().0.iter().fold(0, |all, record| all | self.carries(record));
+        carries & SIGNS == 0
+    }
+
+    #[inline(always)]
+    fn load<const WORDS: usize>(&self, from: &[AtomicU64], into: &mut [u64]) -> bool {
+        let mut carries = 0;
+        for (to, from) in into.as_chunks_mut::<WORDS>().0.iter_mut().zip(from.as_chunks::<WORDS>().0) {
+            *to = from.each_ref().map(|word| word.load(Ordering::Relaxed));
+            carries |= self.carries(to);
+        }
+        carries & SIGNS == 0
+    }
 }
 
-/// Checks that every float of the records is finite; `first` is the index of the first one in its array.
-pub(crate) fn check(kind: ArrayKind, first: usize, words: &[u64]) -> Result<(), ProtocolError> {
-    let finite = match kind {
-        ArrayKind::Vsl => all_finite::<8>(words, &VSL),
-        ArrayKind::Object => all_finite::<16>(words, &OBJECT),
-        ArrayKind::Light => all_finite::<16>(words, &LIGHT),
-        ArrayKind::Statistics => all_finite::<32>(words, &STATISTICS),
+/// Whether every float of the records is finite.
+pub(crate) fn all_finite(kind: ArrayKind, words: &[u64]) -> bool {
+    match kind {
+        ArrayKind::Vsl => VSL.all_finite::<8>(words),
+        ArrayKind::Object => OBJECT.all_finite::<16>(words),
+        ArrayKind::Light => LIGHT.all_finite::<16>(words),
+        ArrayKind::Statistics => STATISTICS.all_finite::<32>(words),
         ArrayKind::SceneText => true,
-    };
-    if finite { Ok(()) } else { Err(find(kind, first, words)) }
+    }
 }
 
+/// Copies whole records of one array by relaxed loads, and says whether every float of the copy is finite.
+///
+/// One pass: while a check of its own runs over the copy, no further load from the segment is under way, which costs
+/// more than the check.
+pub(crate) fn load(kind: ArrayKind, from: &[AtomicU64], into: &mut [u64]) -> bool {
+    match kind {
+        ArrayKind::Vsl => VSL.load::<8>(from, into),
+        ArrayKind::Object => OBJECT.load::<16>(from, into),
+        ArrayKind::Light => LIGHT.load::<16>(from, into),
+        ArrayKind::Statistics => STATISTICS.load::<32>(from, into),
+        ArrayKind::SceneText => TEXT.load::<8>(from, into),
+    }
+}
+
+/// Copies whole lights by relaxed stores with another first word in each, and says whether every float is finite.
+pub(crate) fn store_lights(from: &[u64], to: &[AtomicU64], stamp: u64) -> bool {
+    let mut carries = 0;
+    for (from, to) in from.as_chunks::<8>().0.iter().zip(to.as_chunks::<8>().0) {
+        to[0].store(stamp, Ordering::Relaxed);
+        for k in 1..8 {
+            to[k].store(from[k], Ordering::Relaxed);
+        }
+        carries |= VSL.carries(from);
+    }
+    carries & SIGNS == 0
+}
+
+/// The first float that is not finite; `first` is the index of the first record in its array.
 #[cold]
-fn find(kind: ArrayKind, first: usize, words: &[u64]) -> ProtocolError {
+pub(crate) fn find(kind: ArrayKind, first: usize, words: &[u64]) -> ProtocolError {
     let bytes: &[u8] = bytemuck::cast_slice(words);
     for (i, record) in bytes.chunks_exact(kind.record_bytes()).enumerate() {
         for field in kind.fields() {
@@ -111,6 +161,31 @@ fn find(kind: ArrayKind, first: usize, words: &[u64]) -> ProtocolError {
 mod tests {
     use super::*;
     use crate::record::{LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
+
+    fn atomic(words: &[u64]) -> Vec<AtomicU64> {
+        words.iter().map(|word| AtomicU64::new(*word)).collect()
+    }
+
+    /// The verdict of `load`, whose copy must be exact.
+    fn load_of(kind: ArrayKind, words: &[u64]) -> bool {
+        let mut copy = vec![0; words.len()];
+        let finite = load(kind, &atomic(words), &mut copy);
+        assert_eq!(copy, words);
+        finite
+    }
+
+    /// The verdict of `store_lights`, whose copy must be exact but for the stamps; of `load` for other records.
+    fn store_of(kind: ArrayKind, words: &[u64]) -> bool {
+        if kind != ArrayKind::Vsl {
+            return load_of(kind, words);
+        }
+        let to = atomic(&vec![0; words.len()]);
+        let finite = store_lights(words, &to, 9);
+        for (i, (word, to)) in words.iter().zip(&to).enumerate() {
+            assert_eq!(to.load(Ordering::Relaxed), if i % 8 == 0 { 9 } else { *word });
+        }
+        finite
+    }
 
     /// Every float field of every record, each of its values, against NaN, both infinities, and the greatest
     /// and least finite values, which must pass.
@@ -158,12 +233,15 @@ mod tests {
                         let start = kind.record_bytes() + at;
                         bytemuck::cast_slice_mut::<u64, u8>(&mut words)[start..start + step]
                             .copy_from_slice(value);
-                        match check(kind, 70, &words) {
-                            Ok(()) => assert!(*ok, "{}.{} accepted", kind.name(), field.name),
-                            Err(ProtocolError::NonFinite { index, field: found, .. }) => {
-                                assert!(!ok && index == 71 && found == field.name);
-                            }
-                            Err(other) => panic!("{other}"),
+                        let verdicts =
+                            [all_finite(kind, &words), load_of(kind, &words), store_of(kind, &words)];
+                        assert_eq!(verdicts, [*ok; 3], "{}.{}", kind.name(), field.name);
+                        if !ok {
+                            let error = find(kind, 70, &words);
+                            let ProtocolError::NonFinite { index, field: found, .. } = error else {
+                                panic!("{error}")
+                            };
+                            assert_eq!((index, found), (71, field.name));
                         }
                     }
                 }
@@ -173,11 +251,9 @@ mod tests {
 
     #[test]
     fn accepts_zeroed_records() {
-        assert!(check(ArrayKind::Vsl, 0, bytemuck::cast_slice(&[VslRecord::default(); 65])).is_ok());
-        assert!(check(ArrayKind::Object, 0, bytemuck::cast_slice(&[ObjectRecord::default(); 2])).is_ok());
-        assert!(check(ArrayKind::Light, 0, bytemuck::cast_slice(&[LightRecord::default(); 2])).is_ok());
-        assert!(
-            check(ArrayKind::Statistics, 0, bytemuck::cast_slice(&[StatisticsRecord::default()])).is_ok()
-        );
+        assert!(all_finite(ArrayKind::Vsl, bytemuck::cast_slice(&[VslRecord::default(); 65])));
+        assert!(all_finite(ArrayKind::Object, bytemuck::cast_slice(&[ObjectRecord::default(); 2])));
+        assert!(all_finite(ArrayKind::Light, bytemuck::cast_slice(&[LightRecord::default(); 2])));
+        assert!(all_finite(ArrayKind::Statistics, bytemuck::cast_slice(&[StatisticsRecord::default()])));
     }
 }

@@ -68,8 +68,9 @@ impl WriteWords for LoomWords {
         }
     }
 
-    fn write_stamped(&self, at: usize, from: &[u64], _record_words: usize, _stamp: u64) {
+    fn write_lights(&self, at: usize, from: &[u64], _stamp: u64) -> bool {
         self.write(at, from);
+        true
     }
 }
 

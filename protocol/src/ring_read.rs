@@ -162,12 +162,14 @@ impl RingReader {
                     continue;
                 }
                 view.versions[c] = 0;
-                words.read(slot + shape.data + range.start, &mut view.words[range.clone()])?;
+                let copy = &mut view.words[range.clone()];
+                let finite = words.read_records(shape.kind, slot + shape.data + range.start, copy)?;
                 if !unmoved()? {
                     return Ok(Slot::Overwritten);
                 }
-                finite::check(shape.kind, c * self.shape.chunk_records, &view.words[range])
-                    .map_err(hostile)?;
+                if !finite {
+                    return Err(hostile(finite::find(shape.kind, c * self.shape.chunk_records, copy)));
+                }
                 view.versions[c] = version;
                 if spent() {
                     return Ok(Slot::OutOfTime);

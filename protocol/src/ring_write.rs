@@ -18,7 +18,7 @@ pub(crate) enum Changed<'a> {
 pub(crate) struct ArraySource<'a> {
     pub(crate) words: &'a [u64],
     pub(crate) changed: Changed<'a>,
-    /// Whether the first word of each record becomes the frame of its chunk's last change.
+    /// Whether these are lights, the first word of which becomes the frame of their chunk's last change.
     pub(crate) stamp: bool,
 }
 
@@ -160,7 +160,6 @@ impl RingWriter {
                     Changed::Compare => content != &state.mirror[at..at + content.len()],
                 };
             if changed {
-                finite::check(shape.kind, c * self.shape.chunk_records, content)?;
                 state.versions[c] = frame;
                 if let Some(mirror) = state.mirror.get_mut(at..at + content.len()) {
                     mirror.copy_from_slice(content);
@@ -169,10 +168,14 @@ impl RingWriter {
             let version = state.versions[c];
             if version > slot_frame {
                 words.store(slot + shape.table + c, version);
-                if source.stamp {
-                    words.write_stamped(slot + shape.data + at, content, shape.record_words, version);
+                let finite = if source.stamp {
+                    words.write_lights(slot + shape.data + at, content, version)
                 } else {
                     words.write(slot + shape.data + at, content);
+                    finite::all_finite(shape.kind, content)
+                };
+                if !finite {
+                    return Err(finite::find(shape.kind, c * self.shape.chunk_records, content));
                 }
             }
         }

@@ -6,6 +6,8 @@
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 
 use crate::error::ProtocolError;
+use crate::finite;
+use crate::record::ArrayKind;
 
 /// The reader's fences, named so that a test can remove one of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,12 @@ pub(crate) trait ReadWords {
     /// Copies `into.len()` words from word `at`, each by one relaxed load.
     fn read(&self, at: usize, into: &mut [u64]) -> Result<(), ProtocolError>;
 
+    /// Like `read` for whole records of one array; says whether every float of the copy is finite.
+    fn read_records(&self, kind: ArrayKind, at: usize, into: &mut [u64]) -> Result<bool, ProtocolError> {
+        self.read(at, into)?;
+        Ok(finite::all_finite(kind, into))
+    }
+
     /// An acquire fence. (Acquire *loads* are not guaranteed to work on read-only maps, fences are.)
     fn fence_acquire(&self, _place: ReadFence) {
         fence(Ordering::Acquire);
@@ -53,15 +61,14 @@ pub(crate) trait WriteWords {
     fn fence_release(&self);
     /// Stores the words from word `at` on, each by one relaxed store.
     fn write(&self, at: usize, from: &[u64]);
-    /// Like `write` for whole records, with another first word in each of them.
-    fn write_stamped(&self, at: usize, from: &[u64], record_words: usize, stamp: u64);
+    /// Like `write` for whole lights, with another first word in each; says whether every float is finite.
+    fn write_lights(&self, at: usize, from: &[u64], stamp: u64) -> bool;
 }
 
 impl ReadWords for [AtomicU64] {
     #[inline]
     fn read(&self, at: usize, into: &mut [u64]) -> Result<(), ProtocolError> {
-        let from = at.checked_add(into.len()).and_then(|end| self.get(at..end));
-        let from = from.ok_or_else(|| out_of_range(at, into.len(), self.len()))?;
+        let from = range(self, at, into.len())?;
         // Eight words a step: atomic loads are not unrolled by the compiler.
         let (steps, rest) = into.as_chunks_mut::<8>();
         let (from_steps, from_rest) = from.as_chunks::<8>();
@@ -73,6 +80,17 @@ impl ReadWords for [AtomicU64] {
         }
         Ok(())
     }
+
+    #[inline]
+    fn read_records(&self, kind: ArrayKind, at: usize, into: &mut [u64]) -> Result<bool, ProtocolError> {
+        Ok(finite::load(kind, range(self, at, into.len())?, into))
+    }
+}
+
+#[inline]
+fn range(words: &[AtomicU64], at: usize, count: usize) -> Result<&[AtomicU64], ProtocolError> {
+    let range = at.checked_add(count).and_then(|end| words.get(at..end));
+    range.ok_or_else(|| out_of_range(at, count, words.len()))
 }
 
 #[cold]
@@ -103,23 +121,7 @@ impl WriteWords for [AtomicU64] {
     }
 
     #[inline]
-    fn write_stamped(&self, at: usize, from: &[u64], record_words: usize, stamp: u64) {
-        let to = &self[at..at + from.len()];
-        if record_words == 8 {
-            for (to, from) in to.as_chunks::<8>().0.iter().zip(from.as_chunks::<8>().0) {
-                to[0].store(stamp, Ordering::Relaxed);
-                for k in 1..8 {
-                    to[k].store(from[k], Ordering::Relaxed);
-                }
-            }
-            return;
-        }
-        let to = to.chunks_exact(record_words);
-        for (to, from) in to.zip(from.chunks_exact(record_words)) {
-            to[0].store(stamp, Ordering::Relaxed);
-            for (word, value) in to[1..].iter().zip(&from[1..]) {
-                word.store(*value, Ordering::Relaxed);
-            }
-        }
+    fn write_lights(&self, at: usize, from: &[u64], stamp: u64) -> bool {
+        finite::store_lights(from, &self[at..at + from.len()], stamp)
     }
 }
