@@ -9,7 +9,7 @@ use crate::{
     signals::Listener,
     supervise::{BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Supervisor},
 };
-use photonstream_protocol::{ChannelName, VslFrame};
+use photonstream_protocol::{ChannelName, ProtocolError, VslFrame};
 use photonstream_renderer_cpu::LayerKind;
 use photonstream_scene::SceneConfig;
 use photonstream_simulator::cli::Overrides;
@@ -175,8 +175,12 @@ pub(crate) fn verbosity(global: &Global) -> Vec<OsString> {
 
 /// Removes the folder of a channel of our own, and whatever a crash left in it.
 pub(crate) fn remove_channel(channel: &ChannelName) {
-    if let Err(error) = photonstream_protocol::clean() {
-        tracing::warn!("channel {channel} could not be removed: {error}; try `photonstream clean`");
+    match photonstream_protocol::clean_one(channel) {
+        // Nothing left, or taken by somebody else in the meantime.
+        Ok(_) | Err(ProtocolError::NotCreated { .. } | ProtocolError::ChannelBusy { .. }) => {}
+        Err(error) => {
+            tracing::warn!("channel {channel} could not be removed: {error}; try `photonstream clean`")
+        }
     }
 }
 

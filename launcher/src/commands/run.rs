@@ -185,7 +185,7 @@ fn renderer(
     };
     arguments.extend(["--channel".into(), channel.as_str().into(), "--out".into(), folder.into()]);
     arguments.push("--headless".into());
-    arguments.extend(args.frames.map(|n| format!("--frames={n}").into()));
+    arguments.extend(args.frames.iter().flat_map(|n| ["--frames".into(), n.to_string().into()]));
     arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
     Ok(Role { name: name.to_owned(), kind: Kind::Renderer, plug_in, arguments })
 }

@@ -10,6 +10,7 @@ use photonstream_simulator::{cli, service::Summary};
 
 /// Arguments of `photonstream simulate`.
 #[derive(Debug, clap::Args)]
+#[group(skip)]
 #[command(after_help = "\
 Ends with Ctrl-C, SIGTERM or SIGHUP, or when a client of its control socket asks for it.
 

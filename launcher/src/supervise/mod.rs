@@ -80,15 +80,19 @@ impl Supervisor {
                 return Err(LauncherError::Interrupted);
             }
         }
+        let mut given_up = None;
         for process in &mut self.processes {
             match process.look() {
                 Err(error) if process.is(Kind::Simulator) => return Err(error),
                 Err(error) => {
-                    tracing::error!("{error}");
+                    given_up = Some(process.role.name.clone());
                     self.failures.push(error);
                 }
                 Ok(()) => process.start_if_due(self.output)?,
             }
+        }
+        if let Some(name) = given_up.filter(|_| !self.is_over(Kind::Renderer)) {
+            tracing::warn!("{name} is given up; the others go on");
         }
         Ok(())
     }

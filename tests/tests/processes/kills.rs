@@ -1,0 +1,142 @@
+//! What happens when a process is killed: it comes back, and the others go on.
+
+use crate::harness::{Ground, config, files, kill, wait_for};
+use rustix::process::Signal;
+use serde_json::Value;
+use std::{fs, path::Path};
+
+/// Lines that the probe plug-in has written.
+fn probe_lines(folder: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(folder.join("probe.jsonl")).unwrap_or_default();
+    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+#[test]
+fn a_killed_renderer_comes_back_and_pictures_continue() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let run = ground.start(&[
+        "run",
+        &scene,
+        "--headless",
+        "--frames",
+        "100000",
+        "--sampling",
+        "fresh",
+        "--vsls",
+        "50",
+        "--size",
+        "8x8",
+        "--out",
+        "film",
+    ]);
+    let first = ground.process(" renderer cpu ", None);
+    let picture = ground.path("film/frame-0001.exr");
+    wait_for("a picture", || picture.exists().then_some(()));
+    kill(first, Signal::KILL);
+    let second = ground.process(" renderer cpu ", Some(first));
+    fs::remove_file(&picture).unwrap();
+    // The new process starts its numbers again.
+    wait_for("a picture of the new process", || picture.exists().then_some(()));
+    assert_ne!(first, second);
+    run.signal(Signal::TERM);
+    let said = run.wait();
+    said.expect(130, &["cpu was ended by signal 9 (SIGKILL)", "starting it again"]);
+    ground.wait_for_silence();
+}
+
+#[test]
+fn renderers_survive_the_simulator_and_follow_its_successor() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let run = ground.start(&[
+        "run",
+        &scene,
+        "--renderer",
+        "probe",
+        "--renderer",
+        "cpu",
+        "--headless",
+        "--frames",
+        "100000",
+        "--sampling",
+        "fresh",
+        "--vsls",
+        "50",
+        "--size",
+        "8x8",
+        "--out",
+        "film",
+        "--channel",
+        "kills",
+    ]);
+    let folder = ground.path("film/probe");
+    let first = ground.process(" simulate ", None);
+    let renderer = ground.process(" renderer cpu ", None);
+    let is_frame = |line: &Value| line["frame"].is_u64();
+    wait_for("frames", || (probe_lines(&folder).iter().filter(|l| is_frame(l)).count() >= 3).then_some(()));
+    let old_segment = ground.segment("kills");
+
+    kill(first, Signal::KILL);
+    ground.process(" simulate ", Some(first));
+    let lines = wait_for("frames of the new simulator", || {
+        let lines = probe_lines(&folder);
+        let frames: Vec<_> = lines.iter().filter(|l| is_frame(l)).collect();
+        let epochs = (frames.first()?["epoch"].as_u64()?, frames.last()?["epoch"].as_u64()?);
+        (epochs.1 > epochs.0).then_some(lines)
+    });
+    // Both renderers are the processes they were.
+    let pids: Vec<_> = lines.iter().filter_map(|line| line["pid"].as_u64()).collect();
+    assert!(pids.windows(2).all(|pair| pair[0] == pair[1]), "{pids:?}");
+    assert_eq!(ground.process(" renderer cpu ", None), renderer);
+    // Whoever noticed the death still had the lights.
+    for line in lines.iter().filter(|line| line["gone"] == true) {
+        assert_eq!(line["kept_vsls"], 50);
+    }
+    let before = files(&ground.path("film/cpu"), "exr");
+    wait_for("more pictures", || (files(&ground.path("film/cpu"), "exr") > before).then_some(()));
+    wait_for("the old segment to be removed", || (!old_segment.exists()).then_some(()));
+
+    let segment = ground.segment("kills");
+    run.signal(Signal::TERM);
+    run.wait().expect(130, &["simulator was ended by signal 9 (SIGKILL)"]);
+    ground.wait_for_silence();
+    assert!(!segment.exists());
+}
+
+#[test]
+fn three_renderers_work_at_once() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let report = ground.json(&[
+        "run",
+        &scene,
+        "--renderer",
+        "cpu",
+        "--renderer",
+        "cpu",
+        "--renderer",
+        "probe",
+        "--headless",
+        "--frames",
+        "2",
+        "--vsls",
+        "50",
+        "--size",
+        "8x8",
+        "--sampling",
+        "fresh",
+        "--out",
+        "film",
+        "--json",
+    ]);
+    let renderers = report["renderers"].as_array().unwrap();
+    let names: Vec<_> = renderers.iter().map(|r| r["folder"].as_str().unwrap()).collect();
+    assert_eq!(names, ["film/cpu", "film/cpu-2", "film/probe"]);
+    assert!(renderers.iter().all(|r| r["failed"] == false && r["restarts"] == 0), "{report}");
+    for name in &names[..2] {
+        assert_eq!(files(&ground.path(name), "exr"), 2, "{name}");
+    }
+    assert_eq!(probe_lines(&ground.path("film/probe")).len(), 2);
+    ground.wait_for_silence();
+}

@@ -1,0 +1,11 @@
+//! The command as its users meet it: processes that start, crash, come back and end, and what they say.
+#![allow(clippy::unwrap_used)]
+
+mod default_run;
+mod ending;
+mod harness;
+mod kills;
+mod main_job;
+mod messages;
+mod plug_ins;
+mod reports;
