@@ -7,7 +7,7 @@ use glam::Vec3;
 /// `n` must have unit length. Continuous except across `n.z = 0`; well defined at both poles.
 ///
 /// Source: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
-#[inline]
+#[inline(always)]
 pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
     let sign = 1.0f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);
@@ -16,7 +16,7 @@ pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
 }
 
 /// A vector given in the basis of `n` (`local.z` along `n`) in the space of `n`.
-#[inline]
+#[inline(always)]
 pub fn from_local(n: Vec3, local: Vec3) -> Vec3 {
     let (t, b) = tangents(n);
     t * local.x + b * local.y + n * local.z

@@ -101,11 +101,17 @@ impl LightShape {
         }
     }
 
-    /// One photon; takes two 2D dimensions of `sample`.
+    /// One photon; takes two 2D dimensions of `sample`: for [`LightShape::emit_with`] the direction, then the position.
     #[inline]
     pub fn emit(&self, bounds: Bounds, sample: &mut Sample) -> Emission {
         let u = sample.next_2d();
-        let u_position = sample.next_2d();
+        self.emit_with(bounds, u, sample.next_2d())
+    }
+
+    /// One photon from its random numbers: `u` for its direction (its place in the beam of a directional light),
+    /// `u_position` for its place on an area light, which other lights ignore.
+    #[inline]
+    pub fn emit_with(&self, bounds: Bounds, u: [f32; 2], u_position: [f32; 2]) -> Emission {
         match *self {
             Self::Point { position } => {
                 Emission { origin: position, direction: sampling::sphere(u), weight: 1.0 }

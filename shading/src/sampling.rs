@@ -27,12 +27,63 @@ pub fn cone(axis: Vec3, versine_max: f32, u: [f32; 2]) -> Vec3 {
 ///
 /// Source: Malley's method over the polar disc map; cos θ is taken from the same random number, so that the
 /// density is exact and the direction never points below the surface.
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere(n: Vec3, u: [f32; 2]) -> Vec3 {
     let r = u[0].sqrt();
     let (sin_phi, cos_phi) = sin_cos_turn(u[1]);
     let cos_theta = (1.0 - u[0]).max(0.0).sqrt();
     basis::from_local(n, Vec3::new(r * cos_phi, r * sin_phi, cos_theta))
+}
+
+/// Vectors by component, all of equal length.
+#[derive(Clone, Debug, Default)]
+pub struct Vectors {
+    /// First components.
+    pub x: Vec<f32>,
+    /// Second components.
+    pub y: Vec<f32>,
+    /// Third components.
+    pub z: Vec<f32>,
+}
+
+impl Vectors {
+    /// Empties the list.
+    pub fn clear(&mut self) {
+        self.x.clear();
+        self.y.clear();
+        self.z.clear();
+    }
+
+    /// Adds a vector.
+    #[inline]
+    pub fn push(&mut self, v: Vec3) {
+        self.x.push(v.x);
+        self.y.push(v.y);
+        self.z.push(v.z);
+    }
+
+    /// Vector `i`.
+    #[inline]
+    pub fn get(&self, i: usize) -> Vec3 {
+        Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+}
+
+/// Replaces each normal by [`cosine_hemisphere`] of it and its two random numbers, eight at a time where the processor
+/// can: the same to the last bit, as every operation is rounded on its own.
+///
+/// # Panics
+/// If the lists are of unequal length.
+pub fn cosine_hemispheres(normals: &mut Vectors, u: &[f32], v: &[f32]) {
+    let n = u.len();
+    let (x, y, z) = (&mut normals.x[..n], &mut normals.y[..n], &mut normals.z[..n]);
+    let v = &v[..n];
+    pulp::Arch::new().dispatch(|| {
+        for i in 0..n {
+            let d = cosine_hemisphere(Vec3::new(x[i], y[i], z[i]), [u[i], v[i]]);
+            (x[i], y[i], z[i]) = (d.x, d.y, d.z);
+        }
+    });
 }
 
 /// A point uniform in the unit disc; `pdf_area` = 1/π.
@@ -64,7 +115,7 @@ pub const PDF_SPHERE: f32 = 1.0 / (4.0 * PI);
 ///
 /// The same polynomial on every machine (a libm may differ), and vectorisable: photons land on the same triangle
 /// everywhere.
-#[inline]
+#[inline(always)]
 pub fn sin_cos_turn(turn: f32) -> (f32, f32) {
     // Quadrant and remainder in [-1/8, 1/8] turns; the product and the difference are exact in f32. Truncation is the
     // floor here, and needs no call where the processor lacks a rounding instruction.
@@ -151,6 +202,20 @@ mod tests {
                 [(cos_theta * cos_theta).min(1.0), turn(d.dot(t), d.dot(b))]
             });
         }
+    }
+
+    #[test]
+    fn many_hemispheres_are_what_each_is() {
+        let (mut normals, mut u, mut v) = (Vectors::default(), vec![], vec![]);
+        for i in 0..10_007 {
+            normals.push(sphere([uniform(i, 0), uniform(i, 1)]));
+            u.push(uniform(i, 2));
+            v.push(uniform(i, 3));
+        }
+        let one_by_one: Vec<Vec3> =
+            (0..u.len()).map(|i| cosine_hemisphere(normals.get(i), [u[i], v[i]])).collect();
+        cosine_hemispheres(&mut normals, &u, &v);
+        assert!(one_by_one.iter().enumerate().all(|(i, &d)| d == normals.get(i)));
     }
 
     #[test]

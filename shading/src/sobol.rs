@@ -37,12 +37,86 @@ impl Sequence {
     }
 }
 
+/// Many points side by side, all at the same dimension: what [`Sample`] gives one by one, eight at a time where the
+/// processor can.
+#[derive(Clone, Debug, Default)]
+pub struct SampleBlock {
+    seeds: Vec<u32>,
+    reversed_indices: Vec<u32>,
+    dimension: u32,
+}
+
+impl SampleBlock {
+    /// Empties the block and sets the dimension that its points take next.
+    pub fn restart(&mut self, dimension: u32) {
+        self.seeds.clear();
+        self.reversed_indices.clear();
+        self.dimension = dimension;
+    }
+
+    /// Adds a point. Its own count of dimensions taken is ignored: the block's counts.
+    #[inline]
+    pub fn push(&mut self, sample: Sample) {
+        self.seeds.push(sample.seed);
+        self.reversed_indices.push(sample.reversed_index);
+    }
+
+    /// Point `i`, at the block's dimension.
+    #[inline]
+    pub fn get(&self, i: usize) -> Sample {
+        Sample { seed: self.seeds[i], reversed_index: self.reversed_indices[i], dimension: self.dimension }
+    }
+
+    /// Number of dimensions that the block's points have taken.
+    pub fn dimension(&self) -> u32 {
+        self.dimension
+    }
+
+    /// Passes over a dimension that nobody needs.
+    pub fn skip_dimension(&mut self) {
+        self.dimension = self.dimension.wrapping_add(1);
+    }
+
+    /// [`Sample::next_1d`] of every point into `numbers`, one for each.
+    pub fn next_1d(&mut self, numbers: &mut Vec<f32>) {
+        numbers.clear();
+        numbers.resize(self.seeds.len(), 0.0);
+        let offset = dimension_offset(self.dimension);
+        let points = self.seeds.iter().zip(&self.reversed_indices);
+        pulp::Arch::new().dispatch(|| {
+            for (number, (&seed, &reversed)) in numbers.iter_mut().zip(points) {
+                let (hash, index) = shuffle(seed, offset, reversed);
+                *number = scramble(index, hash.wrapping_mul(FIRST));
+            }
+        });
+        self.dimension = self.dimension.wrapping_add(1);
+    }
+
+    /// [`Sample::next_2d`] of every point, the first numbers into `first`, the second into `second`.
+    pub fn next_2d(&mut self, first: &mut Vec<f32>, second: &mut Vec<f32>) {
+        for numbers in [&mut *first, &mut *second] {
+            numbers.clear();
+            numbers.resize(self.seeds.len(), 0.0);
+        }
+        let offset = dimension_offset(self.dimension);
+        let points = self.seeds.iter().zip(&self.reversed_indices);
+        pulp::Arch::new().dispatch(|| {
+            for ((a, b), (&seed, &reversed)) in first.iter_mut().zip(second.iter_mut()).zip(points) {
+                let (hash, index) = shuffle(seed, offset, reversed);
+                *a = scramble(index, hash.wrapping_mul(FIRST));
+                *b = scramble(pascal(index), hash.wrapping_mul(SECOND));
+            }
+        });
+        self.dimension = self.dimension.wrapping_add(1);
+    }
+}
+
 impl Sample {
     /// The next number in [0, 1).
     #[inline]
     pub fn next_1d(&mut self) -> f32 {
         let (hash, index) = self.next_dimension();
-        scramble(index, hash.wrapping_mul(0x85EB_CA6B))
+        scramble(index, hash.wrapping_mul(FIRST))
     }
 
     /// The next two numbers in [0, 1), stratified together.
@@ -58,10 +132,27 @@ impl Sample {
     /// A hash for the next dimension, and the sample's index shuffled by it.
     #[inline]
     fn next_dimension(&mut self) -> (u32, u32) {
-        let hash = mix(self.seed.wrapping_add(self.dimension.wrapping_mul(0x9E37_79B9)));
+        let offset = dimension_offset(self.dimension);
         self.dimension = self.dimension.wrapping_add(1);
-        (hash, laine_karras(self.reversed_index, hash).reverse_bits())
+        shuffle(self.seed, offset, self.reversed_index)
     }
+}
+
+/// Factors that make two scrambles of one hash.
+const FIRST: u32 = 0x85EB_CA6B;
+const SECOND: u32 = 0xC2B2_AE35;
+
+/// What tells a dimension's hash from those of its neighbours.
+#[inline(always)]
+fn dimension_offset(dimension: u32) -> u32 {
+    dimension.wrapping_mul(0x9E37_79B9)
+}
+
+/// The hash of a dimension, and a point's index shuffled by it.
+#[inline(always)]
+fn shuffle(seed: u32, offset: u32, reversed_index: u32) -> (u32, u32) {
+    let hash = mix(seed.wrapping_add(offset));
+    (hash, laine_karras(reversed_index, hash).reverse_bits())
 }
 
 /// The van der Corput sequence in base 2: Sobol's first dimension, not scrambled.
@@ -71,7 +162,7 @@ pub fn van_der_corput(index: u32) -> f32 {
 }
 
 /// Owen-scrambles digits given least significant first, and maps them to [0, 1).
-#[inline]
+#[inline(always)]
 fn scramble(reversed_digits: u32, seed: u32) -> f32 {
     unit(laine_karras(reversed_digits, seed).reverse_bits())
 }
@@ -80,7 +171,7 @@ fn scramble(reversed_digits: u32, seed: u32) -> f32 {
 ///
 /// Bit j is the parity of the bits k of `index` with C(k, j) odd, which by Lucas' theorem are the supersets k ⊇ j:
 /// a sum over supersets, one step for each of the five bits of an index of a bit.
-#[inline]
+#[inline(always)]
 fn pascal(index: u32) -> u32 {
     let mut x = index;
     x ^= (x >> 1) & 0x5555_5555;
@@ -92,7 +183,7 @@ fn pascal(index: u32) -> u32 {
 }
 
 /// A bijection in which bit k of the result depends on bits 0..=k of `x` only: an Owen scramble of reversed digits.
-#[inline]
+#[inline(always)]
 fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3D20_ADEA);
     x = x.wrapping_add(seed);
@@ -103,7 +194,7 @@ fn laine_karras(mut x: u32, seed: u32) -> u32 {
 }
 
 /// A 32-bit finaliser ("lowbias32" of Wellons' hash prospector).
-#[inline]
+#[inline(always)]
 fn mix(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7FEB_352D);
@@ -112,7 +203,7 @@ fn mix(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-#[inline]
+#[inline(always)]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
@@ -160,6 +251,25 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_block_gives_what_its_points_give() {
+        let sequence = Sequence::new(5, 6);
+        // Across the end of the first 2³² points, and not a multiple of any vector's length.
+        let mut one_by_one: Vec<Sample> =
+            ((1u64 << 32) - 500..(1 << 32) + 531).map(|i| sequence.sample(i)).collect();
+        let mut block = SampleBlock::default();
+        block.restart(0);
+        one_by_one.iter().for_each(|&s| block.push(s));
+        let (mut a, mut b) = (vec![], vec![]);
+        for _ in 0..5 {
+            block.next_1d(&mut a);
+            assert!(one_by_one.iter_mut().zip(&a).all(|(s, &x)| s.next_1d() == x));
+            block.next_2d(&mut a, &mut b);
+            assert!(one_by_one.iter_mut().zip(a.iter().zip(&b)).all(|(s, (&x, &y))| s.next_2d() == [x, y]));
+            assert_eq!(block.get(7).next_1d(), one_by_one[7].clone().next_1d());
         }
     }
 

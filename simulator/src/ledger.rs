@@ -14,7 +14,7 @@ use photonstream_scene::{Sampling, Scene};
 use std::{collections::BTreeMap, sync::Arc};
 
 /// Paths in one task: enough to make handing it over cheap, few enough to share the work evenly.
-pub const PATHS_PER_TASK: u32 = 256;
+pub const PATHS_PER_TASK: u32 = 512;
 
 /// Slots to be traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use crate::{
     ledger::Ledger,
     owner::OwnerTable,
     placement::Placement,
-    tracer::{PathBatch, Tracer},
+    tracer::{PathBatch, Tracer, Wave},
 };
 use photonstream_scene::Scene;
 use rayon::prelude::*;
@@ -56,9 +56,9 @@ impl Simulation {
             left -= block.len() as u64;
             let batches: Vec<PathBatch> = block
                 .par_iter()
-                .map(|task| {
+                .map_init(Wave::default, |wave, task| {
                     let mut batch = PathBatch::default();
-                    self.tracer.trace(task.first_slot, task.count, task.generation, &mut batch);
+                    self.tracer.trace(task.first_slot, task.count, task.generation, wave, &mut batch);
                     batch
                 })
                 .collect();

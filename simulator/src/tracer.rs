@@ -14,7 +14,11 @@ use photonstream_scene::{
     Geometry, Scene, Side, Sides,
     bvh::{Hit, Ray},
 };
-use photonstream_shading::{sampling, surface};
+use photonstream_shading::{
+    sampling::{self, Vectors},
+    sobol::SampleBlock,
+    surface,
+};
 use std::sync::Arc;
 
 /// Highest probability to survive a bounce. A path in a closed scene of albedo 1 would never end; here its weight grows
@@ -103,82 +107,218 @@ impl Tracer {
     /// Traces `count` slots from `first_slot`; slot i of a light takes sample i + `generation` · (slots of the light).
     ///
     /// Generation 0 always replays the same samples; counting it up streams through the sequence. All slots of a batch
-    /// must belong to one light.
-    pub fn trace(&self, first_slot: u32, count: u32, generation: u64, batch: &mut PathBatch) {
-        self.trace_watched(first_slot, count, generation, batch, &mut ());
+    /// must belong to one light. `wave` is memory to work with; what it held before does not matter.
+    pub fn trace(
+        &self,
+        first_slot: u32,
+        count: u32,
+        generation: u64,
+        wave: &mut Wave,
+        batch: &mut PathBatch,
+    ) {
+        self.trace_watched(first_slot, count, generation, wave, batch, &mut ());
     }
 
     /// [`Tracer::trace`], with every ray and hit shown to `watcher`.
+    ///
+    /// All paths of the batch advance together, a bounce at a time and within it a step at a time: the processor works on
+    /// the rays of several paths at once, where it would wait for each ray's hit, and on eight samples in one
+    /// instruction.
     pub(crate) fn trace_watched(
         &self,
         first_slot: u32,
         count: u32,
         generation: u64,
+        wave: &mut Wave,
         batch: &mut PathBatch,
         watcher: &mut impl Watcher,
     ) {
         batch.clear();
         batch.first_slot = first_slot;
+        batch.counters.paths += u64::from(count);
         let light = self.emitters.light_of(first_slot);
         debug_assert!(first_slot + count <= light.slots.end, "a batch belongs to one light");
-        let base = generation * u64::from(light.slots.end - light.slots.start);
-        for slot in first_slot..first_slot + count {
-            let start = batch.deposits.len();
-            self.trace_path(light, base + u64::from(slot - light.slots.start), batch, watcher);
-            batch.lengths.push((batch.deposits.len() - start) as u16);
+        let first_sample = generation * u64::from(light.slots.end - light.slots.start)
+            + u64::from(first_slot - light.slots.start);
+        self.emit(light, first_sample, count, wave);
+        for _ in 0..MAX_DEPOSITS {
+            if wave.photons.is_empty() {
+                break;
+            }
+            self.advance(wave, &mut batch.counters, watcher);
         }
-        batch.counters.paths += u64::from(count);
-        batch.counters.deposits += batch.deposits.len() as u64;
+        batch.counters.truncated += wave.photons.len() as u64;
+        wave.collect(count, batch);
     }
 
-    fn trace_path(&self, light: &LightSlots, index: u64, batch: &mut PathBatch, watcher: &mut impl Watcher) {
-        let mut sample = light.sequence.sample(index);
+    /// Fills the wave with the photons that leave the light.
+    fn emit(&self, light: &LightSlots, first_sample: u64, count: u32, wave: &mut Wave) {
+        wave.photons.clear();
+        wave.events.clear();
         let shape = &self.scene.lights[light.light.0 as usize].light.shape;
-        let emission = shape.emit(self.scene.bounds, &mut sample);
-        let mut throughput = light.birth * emission.weight;
-        if throughput == Vec3::ZERO {
-            return;
+        let mut samples = std::mem::take(&mut wave.spare_samples);
+        samples.restart(0);
+        (0..count).for_each(|path| samples.push(light.sequence.sample(first_sample + u64::from(path))));
+        samples.next_2d(&mut wave.first, &mut wave.second);
+        // Only area lights start photons from a place that is sampled, too.
+        let area = !shape.is_delta();
+        if area {
+            samples.next_2d(&mut wave.directions.x, &mut wave.directions.y);
+        } else {
+            samples.skip_dimension();
         }
-        let mut ray = Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
-        for _ in 0..MAX_DEPOSITS {
-            // One sum instead of nine tests: it is finite unless something in it is not.
-            if !(ray.origin + ray.direction + throughput).is_finite() {
-                batch.counters.rejected += 1;
-                return;
+        wave.samples.restart(samples.dimension());
+        for path in 0..count {
+            let i = path as usize;
+            let u_position = if area { [wave.directions.x[i], wave.directions.y[i]] } else { [0.0; 2] };
+            let emission = shape.emit_with(self.scene.bounds, [wave.first[i], wave.second[i]], u_position);
+            let throughput = light.birth * emission.weight;
+            if throughput != Vec3::ZERO {
+                let ray =
+                    Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
+                wave.photons.push(Photon { path, throughput, ray });
+                wave.samples.push(samples.get(i));
             }
-            batch.counters.rays += 1;
-            watcher.ray(&ray);
-            let Some(hit) = self.scene.bvh.closest(&ray) else {
-                batch.counters.escaped += 1;
-                return;
-            };
-            let front = self.geometry.normals[hit.triangle as usize];
-            let side = if front.dot(ray.direction) < 0.0 { Side::Front } else { Side::Back };
-            let reflection = self.surfaces[self.geometry.object_of[hit.triangle as usize].0 as usize];
-            if !reflection.sides.contains(side) {
-                batch.counters.absorbed_back += 1;
-                return;
-            }
-            throughput *= reflection.albedo;
-            watcher.reflection(&hit, side);
-            let Some(owner) = self.owners.owner(hit.triangle, side, hit.u, hit.v) else {
-                batch.counters.rejected += 1;
-                return;
-            };
-            batch.deposits.extend(Deposit::new(owner.0, throughput));
-            if sample.next_1d() >= reflection.survival {
-                return;
-            }
-            throughput /= reflection.survival;
-            if throughput.max_element() > MAX_THROUGHPUT {
-                batch.counters.truncated += 1;
-                return;
-            }
-            let normal = front * side.sign();
-            let vertices = self.geometry.triangle(hit.triangle);
-            ray.origin = surface::offset(vertices, surface::point(vertices, hit.u, hit.v), normal);
-            ray.direction = sampling::cosine_hemisphere(normal, sample.next_2d());
         }
-        batch.counters.truncated += 1;
+        wave.spare_samples = samples;
+    }
+
+    /// One bounce: every photon of the wave to its hit, and those that survive it to their next ray.
+    fn advance(&self, wave: &mut Wave, counters: &mut Counters, watcher: &mut impl Watcher) {
+        wave.hits.clear();
+        for photon in &wave.photons {
+            watcher.ray(&photon.ray);
+            wave.hits.push(self.scene.bvh.closest(&photon.ray));
+        }
+        counters.rays += wave.photons.len() as u64;
+        wave.samples.next_1d(&mut wave.first);
+
+        let mut survivors = 0;
+        wave.directions.clear();
+        let mut surviving_samples = std::mem::take(&mut wave.spare_samples);
+        surviving_samples.restart(wave.samples.dimension());
+        for i in 0..wave.photons.len() {
+            let (photon, roulette) = (wave.photons[i], wave.first[i]);
+            let Some((next, normal)) =
+                self.reflect(&photon, &wave.hits[i], roulette, &mut wave.events, counters, watcher)
+            else {
+                continue;
+            };
+            wave.photons[survivors] = next;
+            wave.directions.push(normal);
+            surviving_samples.push(wave.samples.get(i));
+            survivors += 1;
+        }
+        wave.photons.truncate(survivors);
+        wave.spare_samples = std::mem::replace(&mut wave.samples, surviving_samples);
+
+        wave.samples.next_2d(&mut wave.first, &mut wave.second);
+        sampling::cosine_hemispheres(&mut wave.directions, &wave.first, &wave.second);
+        for (i, photon) in wave.photons.iter_mut().enumerate() {
+            photon.ray.direction = wave.directions.get(i);
+        }
+    }
+
+    /// What becomes of a photon at its hit: its deposit, and if it survives the photon that goes on, from its new origin
+    /// around the returned normal.
+    #[inline]
+    fn reflect(
+        &self,
+        photon: &Photon,
+        hit: &Option<Hit>,
+        roulette: f32,
+        events: &mut Vec<(u32, Deposit)>,
+        counters: &mut Counters,
+        watcher: &mut impl Watcher,
+    ) -> Option<(Photon, Vec3)> {
+        let Some(hit) = hit else {
+            // A ray that is not finite hits nothing. One sum instead of nine tests: it is finite unless a part is not.
+            if (photon.ray.origin + photon.ray.direction + photon.throughput).is_finite() {
+                counters.escaped += 1;
+            } else {
+                counters.rejected += 1;
+            }
+            return None;
+        };
+        let front = self.geometry.normals[hit.triangle as usize];
+        let side = if front.dot(photon.ray.direction) < 0.0 { Side::Front } else { Side::Back };
+        let reflection = self.surfaces[self.geometry.object_of[hit.triangle as usize].0 as usize];
+        if !reflection.sides.contains(side) {
+            counters.absorbed_back += 1;
+            return None;
+        }
+        let throughput = photon.throughput * reflection.albedo;
+        watcher.reflection(hit, side);
+        let Some(owner) =
+            self.owners.owner(hit.triangle, side, hit.u, hit.v).filter(|_| throughput.is_finite())
+        else {
+            counters.rejected += 1;
+            return None;
+        };
+        events.extend(Deposit::new(owner.0, throughput).map(|deposit| (photon.path, deposit)));
+        if roulette >= reflection.survival {
+            return None;
+        }
+        let throughput = throughput / reflection.survival;
+        if throughput.max_element() > MAX_THROUGHPUT {
+            counters.truncated += 1;
+            return None;
+        }
+        let normal = front * side.sign();
+        let vertices = self.geometry.triangle(hit.triangle);
+        let origin = surface::offset(vertices, surface::point(vertices, hit.u, hit.v), normal);
+        // The direction follows for all photons at once.
+        let ray = Ray { origin, direction: Vec3::ZERO, t_max: f32::INFINITY };
+        Some((Photon { path: photon.path, throughput, ray }, normal))
+    }
+}
+
+/// A photon on its way.
+#[derive(Clone, Copy, Debug)]
+struct Photon {
+    /// Which path of the batch it is.
+    path: u32,
+    throughput: Vec3,
+    ray: Ray,
+}
+
+/// Photons that advance together, and the memory they need: a tracer thread keeps one for all its work.
+#[derive(Debug, Default)]
+pub struct Wave {
+    photons: Vec<Photon>,
+    samples: SampleBlock,
+    spare_samples: SampleBlock,
+    hits: Vec<Option<Hit>>,
+    /// Random numbers: for survival, and the first of a direction.
+    first: Vec<f32>,
+    second: Vec<f32>,
+    /// Normals, which become directions.
+    directions: Vectors,
+    /// Deposits of all paths as they happened.
+    events: Vec<(u32, Deposit)>,
+    /// Where each path's deposits go next.
+    places: Vec<u32>,
+}
+
+impl Wave {
+    /// Sorts the deposits by path, each path's in their order, into the batch.
+    fn collect(&mut self, count: u32, batch: &mut PathBatch) {
+        batch.lengths.resize(count as usize, 0);
+        for &(path, _) in &self.events {
+            batch.lengths[path as usize] += 1;
+        }
+        self.places.clear();
+        self.places.extend(batch.lengths.iter().scan(0, |end, &length| {
+            let start = *end;
+            *end += u32::from(length);
+            Some(start)
+        }));
+        batch.deposits.resize(self.events.len(), Deposit { vsl: 0, rgb: [0; 3] });
+        for &(path, deposit) in &self.events {
+            let place = &mut self.places[path as usize];
+            batch.deposits[*place as usize] = deposit;
+            *place += 1;
+        }
+        batch.counters.deposits += self.events.len() as u64;
     }
 }

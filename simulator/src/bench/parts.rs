@@ -5,7 +5,7 @@ use crate::{
     ledger::{PATHS_PER_TASK, Task},
     pool::PathPool,
     simulation::Simulation,
-    tracer::{PathBatch, Watcher},
+    tracer::{PathBatch, Watcher, Wave},
 };
 use glam::Vec3A;
 use obvhs::{
@@ -89,11 +89,19 @@ impl Recording {
         let tasks: Vec<Task> =
             std::iter::from_fn(|| ledger.next_task()).take(paths.div_ceil(PATHS_PER_TASK) as usize).collect();
         let mut recorder = Recorder::default();
+        let mut wave = Wave::default();
         let batches: Vec<PathBatch> = tasks
             .iter()
             .map(|task| {
                 let mut batch = PathBatch::default();
-                simulation.tracer.trace_watched(task.first_slot, task.count, 0, &mut batch, &mut recorder);
+                simulation.tracer.trace_watched(
+                    task.first_slot,
+                    task.count,
+                    0,
+                    &mut wave,
+                    &mut batch,
+                    &mut recorder,
+                );
                 batch
             })
             .collect();
@@ -125,10 +133,10 @@ impl Recording {
             per_ray(begun.elapsed())
         };
         let bvh = &simulation.scene.bvh;
-        let mut batch = PathBatch::default();
+        let (mut wave, mut batch) = (Wave::default(), PathBatch::default());
         let tracer_ns = timed(&mut || {
             for task in &self.tasks {
-                simulation.tracer.trace(task.first_slot, task.count, task.generation, &mut batch);
+                simulation.tracer.trace(task.first_slot, task.count, task.generation, &mut wave, &mut batch);
                 black_box(&batch);
             }
         });

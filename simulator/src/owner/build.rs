@@ -1,11 +1,11 @@
 //! Turns placed lights into the table of their owners: for each cell the lights that can be nearest within it.
 
-use super::{Candidate, Grid, NO_CELLS, OwnerTable, SEVERAL};
+use super::{CROWD, Candidate, Cell, Grid, NOBODY, OwnerTable};
 use crate::{
     placement::Placement,
     vsl::{COMPATIBLE_COSINE, Surface},
 };
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use photonstream_scene::{Geometry, Scene};
 use photonstream_shading::surface;
 use rayon::prelude::*;
@@ -22,12 +22,9 @@ const TRIANGLES_PER_TASK: u32 = 1024;
 impl OwnerTable {
     /// The table of `placement` on `scene`; the same on any number of threads.
     pub fn new(scene: &Scene, placement: &Placement) -> Self {
-        let none = Grid { first: NO_CELLS, columns: 0, rows: 0 };
-        let mut table = Self {
-            grids: vec![[none; 2]; scene.geometry.triangles.len()],
-            cells: vec![],
-            candidates: vec![],
-        };
+        let none = Grid { first: NOBODY, columns: 0, rows: 0 };
+        let mut table =
+            Self { grids: vec![[none; 2]; scene.geometry.triangles.len()], cells: vec![], crowds: vec![] };
         for (surface, vsls) in &placement.surfaces {
             if vsls.is_empty() {
                 continue;
@@ -55,14 +52,17 @@ impl OwnerTable {
     }
 
     fn append(&mut self, surface: Surface, start: u32, part: Part) {
-        let (first_cell, first_candidate) = (self.cells.len() as u32, self.candidates.len() as u32);
+        let (first_cell, first_crowd) = (self.cells.len() as u32, self.crowds.len() as u32);
         for (offset, mut grid) in part.grids.into_iter().enumerate() {
-            grid.first += first_cell;
+            grid.first += if grid.columns > 0 { first_cell } else { 0 };
             self.grids[start as usize + offset][surface.side as usize] = grid;
         }
-        self.cells
-            .extend(part.cells.into_iter().map(|c| if c & SEVERAL != 0 { c + first_candidate } else { c }));
-        self.candidates.extend(part.candidates);
+        self.cells.extend(part.cells.into_iter().map(|mut cell| {
+            let crowd = cell.vsl[0] & CROWD != 0;
+            cell.vsl[0] += if crowd { first_crowd } else { 0 };
+            cell
+        }));
+        self.crowds.extend(part.crowds);
     }
 }
 
@@ -125,8 +125,8 @@ impl Lights {
 #[derive(Default)]
 struct Part {
     grids: Vec<Grid>,
-    cells: Vec<u32>,
-    candidates: Vec<Candidate>,
+    cells: Vec<Cell>,
+    crowds: Vec<Candidate>,
 }
 
 impl Part {
@@ -149,53 +149,75 @@ impl Part {
                 } else {
                     let centre = a + edge_u * u + edge_v * v;
                     let near = lights.near(centre, radius, normal);
-                    self.cell(lights, centre, [edge_u, edge_v], [step_u, step_v], &near)
+                    self.cell(&candidates(lights, centre, [edge_u, edge_v], [step_u, step_v], &near))
                 };
                 self.cells.push(cell);
             }
         }
-        self.grids.push(grid);
+        let cells = &self.cells[grid.first as usize..];
+        let owner = cells[0].vsl[0];
+        if owner & CROWD == 0 && cells.iter().all(|cell| cell.vsl == [owner; 4]) {
+            self.cells.truncate(grid.first as usize);
+            self.grids.push(Grid { first: owner, columns: 0, rows: 0 });
+        } else {
+            self.grids.push(grid);
+        }
     }
 
-    /// The entry for a cell whose nearest light is among `near`: drops each light that another beats in all four
-    /// corners, hence, the difference of squared distances being linear, everywhere in the cell.
-    fn cell(
-        &mut self,
-        lights: &Lights,
-        centre: Vec3,
-        edges: [Vec3; 2],
-        steps: [Vec3; 2],
-        near: &[(f32, u32)],
-    ) -> u32 {
-        let first = self.candidates.len();
-        let candidate = |&(distance_sq, index): &(f32, u32)| {
+    fn cell(&mut self, candidates: &[Candidate]) -> Cell {
+        let mut cell = Cell {
+            // Empty places repeat the first light: they are never nearest, and a lone light fills all four.
+            vsl: [candidates[0].vsl; 4],
+            at_centre: Vec4::INFINITY,
+            per_u: Vec4::ZERO,
+            per_v: Vec4::ZERO,
+        };
+        if candidates.len() > 4 {
+            cell.vsl[0] = CROWD | self.crowds.len() as u32;
+            cell.at_centre[0] = 0.0;
+            self.crowds.extend(candidates);
+        } else {
+            for (place, candidate) in candidates.iter().enumerate() {
+                cell.vsl[place] = candidate.vsl;
+                cell.at_centre[place] = candidate.at_centre;
+                cell.per_u[place] = candidate.per_u;
+                cell.per_v[place] = candidate.per_v;
+            }
+        }
+        cell
+    }
+}
+
+/// The lights of `near` that are nearest somewhere in a cell, by number: leaves out each that another beats in all four
+/// corners, hence, the difference of squared distances being linear, everywhere in the cell.
+fn candidates(
+    lights: &Lights,
+    centre: Vec3,
+    edges: [Vec3; 2],
+    steps: [Vec3; 2],
+    near: &[(f32, u32)],
+) -> Vec<Candidate> {
+    let corners = |&(distance_sq, index): &(f32, u32)| {
+        let to_light = lights.positions[index as usize] - centre;
+        let [half_u, half_v] = steps.map(|step| -to_light.dot(step));
+        [half_u + half_v, half_u - half_v, half_v - half_u, -half_u - half_v].map(|x| distance_sq + x)
+    };
+    let at_corners: Vec<[f32; 4]> = near.iter().map(corners).collect();
+    // Beaten by a clear margin, so that rounding drops nobody who could win.
+    let margin = near[0].0.max(steps[0].length_squared() + steps[1].length_squared()) * 1e-5;
+    let beaten =
+        |i: usize| at_corners.iter().any(|other| (0..4).all(|c| other[c] + margin < at_corners[i][c]));
+    let mut candidates: Vec<Candidate> = (0..near.len())
+        .filter(|&i| !beaten(i))
+        .map(|i| {
+            let (distance_sq, index) = near[i];
             let to_light = lights.positions[index as usize] - centre;
             let [per_u, per_v] = edges.map(|edge| -2.0 * to_light.dot(edge));
             Candidate { vsl: lights.first + index, run: 0, at_centre: distance_sq, per_u, per_v }
-        };
-        let corners = |&(distance_sq, index): &(f32, u32)| {
-            let to_light = lights.positions[index as usize] - centre;
-            let [half_u, half_v] = steps.map(|step| -to_light.dot(step));
-            [half_u + half_v, half_u - half_v, half_v - half_u, -half_u - half_v].map(|x| distance_sq + x)
-        };
-        let at_corners: Vec<[f32; 4]> = near.iter().map(corners).collect();
-        // Beaten by a clear margin, so that rounding drops nobody who could win.
-        let margin = near[0].0.max(steps[0].length_squared() + steps[1].length_squared()) * 1e-5;
-        for (i, light) in near.iter().enumerate() {
-            let beaten =
-                (0..near.len()).any(|other| (0..4).all(|c| at_corners[other][c] + margin < at_corners[i][c]));
-            if !beaten {
-                self.candidates.push(candidate(light));
-            }
-        }
-        let run = self.candidates.len() - first;
-        if run == 1 {
-            self.candidates.pop().expect("invariant: one candidate was pushed").vsl
-        } else {
-            // Ties go to the lowest index, whatever the cell.
-            self.candidates[first..].sort_by_key(|c| c.vsl);
-            self.candidates[first].run = run as u32;
-            SEVERAL | first as u32
-        }
-    }
+        })
+        .collect();
+    // Ties go to the lowest number, whatever the cell.
+    candidates.sort_by_key(|c| c.vsl);
+    candidates[0].run = candidates.len() as u32;
+    candidates
 }

@@ -3,7 +3,7 @@
 use super::ledger_actor::ToLedger;
 use crate::{
     ledger::Task,
-    tracer::{PathBatch, Tracer},
+    tracer::{PathBatch, Tracer, Wave},
 };
 use std::sync::Arc;
 
@@ -16,8 +16,9 @@ pub(super) struct Work {
 
 /// Takes work until there is nobody left to give it or to take the result.
 pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>) {
+    let mut wave = Wave::default();
     while let Ok(Work { tracer, task, mut batch }) = work.recv() {
-        tracer.trace(task.first_slot, task.count, task.generation, &mut batch);
+        tracer.trace(task.first_slot, task.count, task.generation, &mut wave, &mut batch);
         if ledger.send(ToLedger::Finished { task, batch }).is_err() {
             return;
         }
