@@ -1,5 +1,6 @@
 //! Turns a scene into figures of speed: the simulator, its parts, publishing and reading.
 
+use super::render::remove_channel;
 use crate::{cli::Global, error::LauncherError, output, progress::Spinner};
 use photonstream_scene::SceneConfig;
 use photonstream_simulator::{
@@ -31,5 +32,8 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let spinner = Spinner::start("bench");
     let report = bench::run(scene, &BenchOptions::default(), &mut |what| spinner.say(what.to_owned()))?;
     drop(spinner);
+    for part in ["stream", "exchange"] {
+        remove_channel(&format!("bench-{part}-{}", std::process::id()).parse()?);
+    }
     output::report(global.json, &report, ToString::to_string)
 }

@@ -39,7 +39,7 @@ struct Report {
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let (a, b) = (Film::read_exr(&args.picture)?, Film::read_exr(&args.reference)?);
     let pick = |film: &Film| match &args.layer {
-        Some(name) => film.layer(name).map(Clone::clone),
+        Some(name) => film.layer(name).cloned(),
         // A film that was read has at least one.
         None => Ok(film.layers()[0].clone()),
     };

@@ -76,6 +76,8 @@ struct Renderer {
 
 /// Time between two looks at the children and the channel.
 const LOOK: Duration = Duration::from_millis(50);
+/// The same, until there is a first frame.
+const FIRST_LOOK: Duration = Duration::from_millis(4);
 /// So long may renderers take to finish after the simulation has ended in order.
 const LAST_PICTURE: Duration = Duration::from_secs(30);
 
@@ -94,10 +96,10 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     // Mistakes are told at once, by this process, before anything is started.
     let scene = scene_name(config, &SceneConfig::from_file(config)?);
     let folders = folders(&args.out, &args.renderers);
-    let mut roles = vec![simulator(config, &channel, &args.overrides, None, global)];
-    for (name, folder) in args.renderers.iter().zip(&folders) {
-        roles.push(renderer(name, folder, &channel, args, global)?);
-    }
+    let named = args.renderers.iter().zip(&folders);
+    let renderers = named
+        .map(|(name, folder)| renderer(name, folder, &channel, args, global))
+        .collect::<Result<_, _>>()?;
     for folder in &folders {
         std::fs::create_dir_all(folder).map_err(|e| LauncherError::io("create folder", folder, e))?;
     }
@@ -109,8 +111,8 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     }
     let output = if global.json { ChildOutput::Aside } else { ChildOutput::Through };
     let mut supervisor = Supervisor::new(output)?;
-    let result = roles.into_iter().try_for_each(|role| supervisor.start(role));
-    let result = result.and_then(|()| watch(&mut supervisor, &channel));
+    let result = supervisor.start(simulator(config, &channel, &args.overrides, None, global));
+    let result = result.and_then(|()| watch(&mut supervisor, &channel, renderers));
     supervisor.end();
     let left_over = supervisor.fates(Kind::Simulator).iter().any(|fate| fate.crashed);
     if args.channel.is_none() || left_over {
@@ -136,19 +138,28 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     supervisor.take_failure().map_or(Ok(()), Err)
 }
 
-/// Until all renderers are done, or the simulation and then they.
-fn watch(supervisor: &mut Supervisor, channel: &ChannelName) -> Result<(), LauncherError> {
+/// Starts `renderers` once the channel is there; until all of them are done, or the simulation and then they.
+fn watch(
+    supervisor: &mut Supervisor,
+    channel: &ChannelName,
+    mut renderers: Vec<Role>,
+) -> Result<(), LauncherError> {
     let light = follow::Light::start();
     let mut subscriber = None;
-    while !supervisor.is_over(Kind::Renderer) {
+    while !renderers.is_empty() || !supervisor.is_over(Kind::Renderer) {
         if supervisor.is_over(Kind::Simulator) {
+            if !renderers.is_empty() {
+                let what = "its first frame";
+                return Err(LauncherError::SimulatorEnded { channel: channel.to_string(), what });
+            }
             tracing::info!("the simulation was ended; waiting for the last pictures");
             return last_pictures(supervisor);
         }
-        supervisor.attend(LOOK)?;
-        // Only for the bar: what is wrong with the channel is the renderers' to say.
+        supervisor.attend(if renderers.is_empty() { LOOK } else { FIRST_LOOK })?;
+        // Only for the start and the bar: what is wrong with the channel is the renderers' to say.
         if let Ok(Some(frame)) = follow::poll(&mut subscriber, channel) {
             light.show(frame);
+            renderers.drain(..).try_for_each(|role| supervisor.start(role))?;
         }
     }
     Ok(())
@@ -187,7 +198,13 @@ fn renderer(
     arguments.push("--headless".into());
     arguments.extend(args.frames.iter().flat_map(|n| ["--frames".into(), n.to_string().into()]));
     arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
-    Ok(Role { name: name.to_owned(), kind: Kind::Renderer, plug_in, arguments })
+    // With several renderers their folders are named after them, and told apart.
+    let shown = if args.renderers.len() == 1 {
+        name.into()
+    } else {
+        folder.file_name().unwrap_or_default().to_string_lossy()
+    };
+    Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments })
 }
 
 /// Where each renderer writes: `out`, or with several of them `out/NAME`, `out/NAME-2` …

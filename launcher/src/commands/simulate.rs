@@ -1,5 +1,6 @@
 //! Turns a scene into a running simulation on a channel.
 
+use super::render::remove_channel;
 use crate::{
     cli::Global,
     error::LauncherError,
@@ -27,6 +28,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     owned::end_with_launcher();
     let summary = cli::run(&args.simulator)?;
+    remove_channel(&args.simulator.channel);
     // A launcher reports for its children.
     if owned::is_owned() { Ok(()) } else { output::report(global.json, &summary, text) }
 }
