@@ -52,11 +52,11 @@ const fn masks(fields: &[Field]) -> ExponentMasks {
     masks
 }
 
-const VSL: ExponentMasks = masks(ArrayKind::Vsl.fields());
-const OBJECT: ExponentMasks = masks(ArrayKind::Object.fields());
-const LIGHT: ExponentMasks = masks(ArrayKind::Light.fields());
-const STATISTICS: ExponentMasks = masks(ArrayKind::Statistics.fields());
-const TEXT: ExponentMasks = masks(ArrayKind::SceneText.fields());
+static VSL: ExponentMasks = masks(ArrayKind::Vsl.fields());
+static OBJECT: ExponentMasks = masks(ArrayKind::Object.fields());
+static LIGHT: ExponentMasks = masks(ArrayKind::Light.fields());
+static STATISTICS: ExponentMasks = masks(ArrayKind::Statistics.fields());
+static TEXT: ExponentMasks = masks(ArrayKind::SceneText.fields());
 
 impl ExponentMasks {
     /// A value with a bit of `SIGNS` where a float of the record is not finite.
