@@ -32,7 +32,7 @@ pub struct Args {
 /// Settings that override the config's `[streaming]` table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Overrides {
-    /// Lighting method [possible values: photon-streaming]
+    /// Lighting method
     #[arg(long, value_parser = ["photon-streaming"])]
     pub method: Option<String>,
     /// Number of virtual surface lights
