@@ -23,7 +23,7 @@ pub(crate) enum LauncherError {
     Simulator(#[from] SimulatorError),
     /// The renderer.
     #[error(transparent)]
-    Render(#[from] RenderError),
+    Render(RenderError),
     /// A picture.
     #[error(transparent)]
     Film(#[from] FilmError),
@@ -86,6 +86,15 @@ pub(crate) enum LauncherError {
     Interrupted,
 }
 
+impl From<RenderError> for LauncherError {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Cancelled => Self::Interrupted,
+            error => Self::Render(error),
+        }
+    }
+}
+
 fn tail(said: &[String]) -> String {
     match said {
         [] => "; it said nothing on stderr".into(),
@@ -107,7 +116,7 @@ impl LauncherError {
             Self::Protocol(error)
             | Self::Simulator(SimulatorError::Protocol(error))
             | Self::Render(RenderError::Protocol(error)) => of_protocol(error),
-            Self::Render(RenderError::Cancelled) | Self::Interrupted => exit::INTERRUPTED,
+            Self::Interrupted => exit::INTERRUPTED,
             Self::Usage(_) | Self::UnknownRenderer { .. } => exit::USAGE,
             Self::Child { code, .. } => *code,
             Self::SimulatorEnded { .. } => exit::CHILD,

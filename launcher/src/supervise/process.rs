@@ -77,7 +77,9 @@ impl Process {
         let complaint = status.code().map(|code| format!("{code} {}", said.join("\n")));
         match self.backoff.failed(uptime, complaint) {
             Verdict::Retry(pause) => {
-                let words = said.last().map_or_else(String::new, |line| format!(" ({line})"));
+                // Who was killed said nothing about it.
+                let last = said.last().filter(|_| code.is_some());
+                let words = last.map_or_else(String::new, |line| format!(" ({line})"));
                 tracing::warn!("{name} {how} after {:.1} s{words}; starting it again", uptime.as_secs_f64());
                 self.state = State::Waiting { until: Instant::now() + pause };
                 Ok(())

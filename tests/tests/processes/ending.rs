@@ -112,6 +112,6 @@ fn interrupted_work_says_so_and_writes_nothing() {
     let threads = || std::fs::read_dir(format!("/proc/{}/task", run.pid())).map_or(0, |d| d.count());
     wait_for("the work", || (threads() > 2).then_some(()));
     kill(run.pid(), Signal::INT);
-    run.wait().expect(130, &[]);
+    run.wait().expect(130, &["interrupted"]);
     assert!(!ground.path("never.exr").exists());
 }
