@@ -1,5 +1,6 @@
 //! Turns a test into a private folder, in which the real command runs under a watchdog.
 
+use photonstream_protocol::Runtime;
 use serde_json::Value;
 use std::{
     ffi::OsStr,
@@ -180,6 +181,12 @@ impl Drop for Running<'_> {
             for (pid, _) in self.ground.processes() {
                 kill(pid, rustix::process::Signal::KILL);
             }
+            // A second panic would hide the first one.
+            if !std::thread::panicking() {
+                self.ground.wait_for_silence();
+            }
+            // Killed simulators leave their segments.
+            let _ = photonstream_protocol::clean_in(&Runtime::at(self.ground.runtime()));
         }
     }
 }

@@ -65,6 +65,8 @@ fn simulator_and_renderer_are_processes_of_their_own() {
     let renderer = ground.process(" renderer cpu ", None);
     assert!(simulator != renderer && simulator != run.pid() && renderer != run.pid());
     wait_for("pictures", || (crate::harness::files(&ground.path("film"), "exr") >= 3).then_some(()));
+    run.signal(rustix::process::Signal::TERM);
+    run.wait().expect(130, &[]);
 }
 
 #[test]
