@@ -78,12 +78,15 @@ pub fn cosine_hemispheres(normals: &mut Vectors, u: &[f32], v: &[f32]) {
     let n = u.len();
     let (x, y, z) = (&mut normals.x[..n], &mut normals.y[..n], &mut normals.z[..n]);
     let v = &v[..n];
-    pulp::Arch::new().dispatch(|| {
-        for i in 0..n {
-            let d = cosine_hemisphere(Vec3::new(x[i], y[i], z[i]), [u[i], v[i]]);
-            (x[i], y[i], z[i]) = (d.x, d.y, d.z);
-        }
-    });
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            for i in 0..n {
+                let d = cosine_hemisphere(Vec3::new(x[i], y[i], z[i]), [u[i], v[i]]);
+                (x[i], y[i], z[i]) = (d.x, d.y, d.z);
+            }
+        },
+    );
 }
 
 /// A point uniform in the unit disc; `pdf_area` = 1/π.

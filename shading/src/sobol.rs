@@ -83,12 +83,15 @@ impl SampleBlock {
         numbers.resize(self.seeds.len(), 0.0);
         let offset = dimension_offset(self.dimension);
         let points = self.seeds.iter().zip(&self.reversed_indices);
-        pulp::Arch::new().dispatch(|| {
-            for (number, (&seed, &reversed)) in numbers.iter_mut().zip(points) {
-                let (hash, index) = shuffle(seed, offset, reversed);
-                *number = scramble(index, hash.wrapping_mul(FIRST));
-            }
-        });
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for (number, (&seed, &reversed)) in numbers.iter_mut().zip(points) {
+                    let (hash, index) = shuffle(seed, offset, reversed);
+                    *number = scramble(index, hash.wrapping_mul(FIRST));
+                }
+            },
+        );
         self.dimension = self.dimension.wrapping_add(1);
     }
 
@@ -100,13 +103,16 @@ impl SampleBlock {
         }
         let offset = dimension_offset(self.dimension);
         let points = self.seeds.iter().zip(&self.reversed_indices);
-        pulp::Arch::new().dispatch(|| {
-            for ((a, b), (&seed, &reversed)) in first.iter_mut().zip(second.iter_mut()).zip(points) {
-                let (hash, index) = shuffle(seed, offset, reversed);
-                *a = scramble(index, hash.wrapping_mul(FIRST));
-                *b = scramble(pascal(index), hash.wrapping_mul(SECOND));
-            }
-        });
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for ((a, b), (&seed, &reversed)) in first.iter_mut().zip(second.iter_mut()).zip(points) {
+                    let (hash, index) = shuffle(seed, offset, reversed);
+                    *a = scramble(index, hash.wrapping_mul(FIRST));
+                    *b = scramble(pascal(index), hash.wrapping_mul(SECOND));
+                }
+            },
+        );
         self.dimension = self.dimension.wrapping_add(1);
     }
 }
