@@ -1,12 +1,13 @@
-//! Turns verified words into an owned frame, double-buffered so that a reader always holds a whole one.
+//! Turns verified words into an owned frame, staged beside the last one so that a reader always holds a whole one.
 
 use std::sync::Arc;
 
 use crate::chunks::{CHUNK_RECORDS, ChunkSet};
 use crate::error::ProtocolError;
 use crate::record::{ArrayKind, LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
-use crate::ring_read::{ArrayView, Head, Staging};
+use crate::ring_read::Head;
 use crate::shape::head;
+use crate::staging::{ArrayView, Patch, Staging};
 
 /// A complete, coherent frame in private memory.
 #[derive(Debug, Clone, Default)]
@@ -38,6 +39,8 @@ pub struct VslFrame {
 const ARRAYS: usize = ArrayKind::ALL.len();
 const VSL: usize = 0;
 const TEXT: usize = 4;
+/// Words of a chunk of lights.
+const CHUNK_WORDS: usize = CHUNK_RECORDS * size_of::<VslRecord>() / 8;
 
 #[derive(Default)]
 struct Buffer {
@@ -91,19 +94,32 @@ impl Buffer {
 pub(crate) struct FramePair {
     front: Buffer,
     back: Buffer,
+    /// Changed lights, where they are few: they are put into `front` once the frame is complete.
+    patch: Patch,
+    patched: bool,
     complete: bool,
 }
 
 impl Staging for FramePair {
-    fn array(&mut self, a: usize, records: usize) -> ArrayView<'_> {
+    fn array(&mut self, a: usize, records: usize, table: &[u64]) -> ArrayView<'_> {
+        let front_versions = &self.front.versions[a];
+        if a == VSL {
+            let same_extent = self.complete && self.front.frame.vsls.len() == records;
+            self.patched = same_extent && self.patch.begin(CHUNK_WORDS, table, front_versions);
+            if self.patched {
+                let patch = Some(&mut self.patch);
+                return ArrayView {
+                    words: &mut [],
+                    versions: &mut [],
+                    front_words: &[],
+                    front_versions,
+                    patch,
+                };
+            }
+        }
         self.back.resize(a, records);
         let (words, versions) = self.back.words_mut(a);
-        ArrayView {
-            words,
-            versions,
-            front_words: self.front.words(a),
-            front_versions: &self.front.versions[a],
-        }
+        ArrayView { words, versions, front_words: self.front.words(a), front_versions, patch: None }
     }
 }
 
@@ -118,6 +134,7 @@ impl FramePair {
         for versions in self.front.versions.iter_mut().chain(&mut self.back.versions) {
             versions.fill(0);
         }
+        self.patch.clear();
     }
 
     /// Makes the staged frame the last complete one, and notes which chunks of lights changed.
@@ -133,12 +150,22 @@ impl FramePair {
         if !simulation_time_s.is_finite() {
             return Err(ProtocolError::corrupt("simulation time", simulation_time_s, "a finite number"));
         }
-        let (front, back) = (&self.front, &mut self.back);
-        changed.reset(back.versions[VSL].len());
-        for (c, version) in back.versions[VSL].iter().enumerate() {
-            if front.versions[VSL].get(c) != Some(version) {
-                changed.insert(c);
+        let (front, back) = (&mut self.front, &mut self.back);
+        if self.patched {
+            changed.reset(front.versions[VSL].len());
+            let (words, versions) = front.words_mut(VSL);
+            self.patch.apply(words, versions, |c| changed.insert(c));
+            // The patched lights are those of the new frame, which becomes the front below.
+            std::mem::swap(&mut front.frame.vsls, &mut back.frame.vsls);
+            std::mem::swap(&mut front.versions[VSL], &mut back.versions[VSL]);
+        } else {
+            changed.reset(back.versions[VSL].len());
+            for (c, version) in back.versions[VSL].iter().enumerate() {
+                if front.versions[VSL].get(c) != Some(version) {
+                    changed.insert(c);
+                }
             }
+            self.patch.clear();
         }
         let frame = &mut back.frame;
         frame.scene_text = text;

@@ -32,6 +32,7 @@ mod ring_read;
 mod ring_write;
 mod runtime;
 mod shape;
+mod staging;
 mod subscriber;
 mod words;
 mod writer_segment;

@@ -3,9 +3,10 @@
 use std::sync::atomic::AtomicU64;
 
 use crate::record::ArrayKind;
-use crate::ring_read::{ArrayView, Outcome, RingReader, Staging};
+use crate::ring_read::{Outcome, RingReader};
 use crate::ring_write::{ArraySource, Changed, FrameHead, RingWriter};
 use crate::shape::{ArrayShape, HEAD_WORDS, Shape};
+use crate::staging::{ArrayView, Staging};
 
 const RECORDS: usize = 40;
 const WORDS: usize = 8;
@@ -30,10 +31,10 @@ struct Copies {
 }
 
 impl Staging for Copies {
-    fn array(&mut self, _a: usize, records: usize) -> ArrayView<'_> {
+    fn array(&mut self, _a: usize, records: usize, _table: &[u64]) -> ArrayView<'_> {
         let (words, versions) =
             (&mut self.words[..records * WORDS], &mut self.versions[..records.div_ceil(4)]);
-        ArrayView { words, versions, front_words: &[], front_versions: &[] }
+        ArrayView { words, versions, front_words: &[], front_versions: &[], patch: None }
     }
 }
 

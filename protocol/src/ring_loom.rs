@@ -9,9 +9,10 @@ use loom::sync::atomic::{AtomicU64, Ordering, fence};
 
 use crate::error::ProtocolError;
 use crate::record::ArrayKind;
-use crate::ring_read::{ArrayView, Outcome, RingReader, Staging};
+use crate::ring_read::{Outcome, RingReader};
 use crate::ring_write::{ArraySource, Changed, FrameHead, RingWriter};
 use crate::shape::{ArrayShape, HEAD_WORDS, Shape};
+use crate::staging::{ArrayView, Staging};
 use crate::words::{ReadFence, ReadWords, ReleaseStore, WriteWords};
 
 /// What a mutant lacks.
@@ -104,12 +105,13 @@ struct Copies {
 }
 
 impl Staging for Copies {
-    fn array(&mut self, _a: usize, records: usize) -> ArrayView<'_> {
+    fn array(&mut self, _a: usize, records: usize, _table: &[u64]) -> ArrayView<'_> {
         ArrayView {
             words: &mut self.words[..records],
             versions: &mut self.versions[..records],
             front_words: &[],
             front_versions: &[],
+            patch: None,
         }
     }
 }

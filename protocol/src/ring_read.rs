@@ -3,6 +3,7 @@
 use crate::error::ProtocolError;
 use crate::finite;
 use crate::shape::{HEAD_WORDS, Shape, change_term, head};
+use crate::staging::Staging;
 use crate::words::{ReadFence, ReadWords};
 
 /// Frames one call tries before it reports `Busy`.
@@ -19,21 +20,6 @@ pub(crate) enum Outcome {
     Busy,
     /// Nothing has been published yet.
     Empty,
-}
-
-/// One array of the frame being put together, and of the last complete one.
-pub(crate) struct ArrayView<'a> {
-    pub(crate) words: &'a mut [u64],
-    /// Version of each chunk in `words`, 0 where it is not verified.
-    pub(crate) versions: &'a mut [u64],
-    pub(crate) front_words: &'a [u64],
-    pub(crate) front_versions: &'a [u64],
-}
-
-/// Where a reader puts a frame together.
-pub(crate) trait Staging {
-    /// Array `a`, sized for `records` records; chunks that were verified before stay.
-    fn array(&mut self, a: usize, records: usize) -> ArrayView<'_>;
 }
 
 /// One reader of a ring.
@@ -141,8 +127,9 @@ impl RingReader {
             if !unmoved()? {
                 return Ok(Slot::Overwritten);
             }
-            let view = staging.array(a, records);
-            let chunk_words = self.shape.chunk_records * shape.record_words;
+            let mut view = staging.array(a, records, &self.table);
+            let (chunk_words, array_words) =
+                (self.shape.chunk_records * shape.record_words, records * shape.record_words);
             for (c, version) in self.table.iter().copied().enumerate() {
                 change_sum = change_sum.wrapping_add(change_term(running_index, version));
                 running_index += 1;
@@ -150,19 +137,11 @@ impl RingReader {
                     let field = format!("version of {} chunk {c}", shape.kind.name());
                     return Err(ProtocolError::corrupt(field, version, format!("1 to {frame}")));
                 }
-                if view.versions[c] == version {
+                let range = c * chunk_words..((c + 1) * chunk_words).min(array_words);
+                if view.holds(c, &range, version) {
                     continue;
                 }
-                let range = c * chunk_words..((c + 1) * chunk_words).min(view.words.len());
-                let known = view.front_words.get(range.clone());
-                if let (Some(known), Some(true)) = (known, view.front_versions.get(c).map(|v| *v == version))
-                {
-                    view.words[range].copy_from_slice(known);
-                    view.versions[c] = version;
-                    continue;
-                }
-                view.versions[c] = 0;
-                let copy = &mut view.words[range.clone()];
+                let copy = view.place(c, &range);
                 let finite = words.read_records(shape.kind, slot + shape.data + range.start, copy)?;
                 if !unmoved()? {
                     return Ok(Slot::Overwritten);
@@ -170,7 +149,7 @@ impl RingReader {
                 if !finite {
                     return Err(hostile(finite::find(shape.kind, c * self.shape.chunk_records, copy)));
                 }
-                view.versions[c] = version;
+                view.verified(c, version);
                 if spent() {
                     return Ok(Slot::OutOfTime);
                 }
