@@ -1,16 +1,23 @@
 //! Turns the protocol's figures to hold into one table, `memcpy` and frames by turns in one run: `cargo bench --bench figures`.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+#![allow(
+    unsafe_code,
+    reason = "`memcpy` out of another map of the same file, which a reader's copy is compared with"
+)]
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use memmap2::{Mmap, MmapMut};
 use photonstream_protocol::{
     AccessMode, ChannelName, ChunkSet, ControlServer, FrameSource, Liveness, Publisher, Reading, Runtime,
     SegmentSpec, StatisticsRecord, Subscriber, VslRecord,
 };
 
-const ROUNDS: usize = 200;
+const ROUNDS: usize = 400;
+/// Turns in which the rounds are divided.
+const TURNS: usize = 8;
 /// Set in the child process that is to be killed: the runtime folder, and whether it has a control socket.
 const CHILD: [&str; 2] = ["PHOTONSTREAM_BENCH_ROOT", "PHOTONSTREAM_BENCH_SOCKET"];
 
@@ -26,8 +33,8 @@ fn main() {
     for count in [10_000, 100_000] {
         frames(count);
     }
-    deaths(true, 20);
-    deaths(false, 5);
+    deaths(true, 10);
+    deaths(false, 3);
 }
 
 fn publisher(runtime: &Runtime, count: usize) -> Publisher {
@@ -72,30 +79,47 @@ fn summary(mut times: Vec<f64>) -> (f64, f64) {
     (times[times.len() / 2], times[times.len() / 10])
 }
 
-/// `memcpy` from three buffers in turn into two, just written as a slot is, and whole and partial frames.
+/// Three buffers of shared memory and another map of them, as a ring and its reader are.
+fn two_maps(bytes: usize) -> (MmapMut, Mmap) {
+    let file = tempfile::tempfile_in("/dev/shm").unwrap();
+    file.set_len(3 * bytes as u64).unwrap();
+    // SAFETY: the file has no name, so that no other process changes its length or bytes.
+    let to = unsafe { MmapMut::map_mut(&file) }.unwrap();
+    // SAFETY: as above; `memcpy` below reads these bytes only between two writes of this thread.
+    let from = unsafe { Mmap::map(&file) }.unwrap();
+    (to, from)
+}
+
+/// `memcpy` from three buffers in turn into two, and whole and partial frames, by turns of some rounds.
 fn frames(count: usize) {
     let root = tempfile::tempdir().unwrap();
     let runtime = Runtime::at(root.path());
     let mut publisher = publisher(&runtime, count);
     let mut subscriber = attach(&runtime);
     let vsls = vec![VslRecord { area: 1.0, flux: [1.0; 3], ..VslRecord::default() }; count];
+    let bytes: &[u8] = bytemuck::cast_slice(&vsls);
     let all = ChunkSet::all(count);
-    let mut from = vec![vsls.clone(); 3];
-    let mut to = vec![vsls.clone(); 2];
+    let (mut shared, other) = two_maps(bytes.len());
+    let mut to = vec![bytes.to_vec(); 2];
     let mut times: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::new());
     let mut read = || while subscriber.read().unwrap() != Reading::New {};
-    for round in 0..ROUNDS {
-        from[round % 3].copy_from_slice(std::hint::black_box(&vsls));
-        let (from, to) = (&from[round % 3], &mut to[round % 2]);
-        times[0].push(us(|| std::hint::black_box(to).copy_from_slice(std::hint::black_box(from))));
-        times[1].push(us(|| publish(&mut publisher, &vsls, &all)));
-        times[2].push(us(&mut read));
-    }
-    for round in 0..ROUNDS {
-        let mut changed = ChunkSet::for_records(count);
-        (round % 50..all.range()).step_by(50).for_each(|chunk| changed.insert(chunk));
-        publish(&mut publisher, &vsls, &changed);
-        times[3].push(us(&mut read));
+    for _ in 0..TURNS {
+        for round in 0..ROUNDS / TURNS {
+            let buffer = round % 3 * bytes.len()..(round % 3 + 1) * bytes.len();
+            shared[buffer.clone()].copy_from_slice(bytes);
+            let (from, to) = (std::hint::black_box(&other[buffer]), &mut to[round % 2]);
+            times[0].push(us(|| std::hint::black_box(to).copy_from_slice(from)));
+        }
+        for _ in 0..ROUNDS / TURNS {
+            times[1].push(us(|| publish(&mut publisher, &vsls, &all)));
+            times[2].push(us(&mut read));
+        }
+        for round in 0..ROUNDS / TURNS {
+            let mut changed = ChunkSet::for_records(count);
+            (round % 50..all.range()).step_by(50).for_each(|chunk| changed.insert(chunk));
+            publish(&mut publisher, &vsls, &changed);
+            times[3].push(us(&mut read));
+        }
     }
     let [copy, publish, whole, partial] = times.map(summary);
     println!(
