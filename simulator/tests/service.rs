@@ -41,7 +41,9 @@ impl Service {
 
     fn end(self) -> Summary {
         self.stop.send(()).unwrap();
-        self.thread.join().unwrap()
+        let summary = self.thread.join().unwrap();
+        photonstream_protocol::clean_one(&self.channel).unwrap();
+        summary
     }
 }
 
@@ -128,6 +130,7 @@ fn the_control_socket_pauses_steps_resumes_tells_and_ends() {
     assert!(matches!(ask(&Request::Reload), Reply::Error { .. }));
     assert!(matches!(ask(&Request::Shutdown), Reply::Ok { .. }));
     assert_eq!(service.thread.join().unwrap().ending, Ending::Shutdown);
+    photonstream_protocol::clean_one(&service.channel).unwrap();
 }
 
 /// A still scene converges, publishes that, and then does nothing: no frame and no path for a second.

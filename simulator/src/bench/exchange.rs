@@ -3,7 +3,7 @@
 use crate::{error::SimulatorError, ledger::Ledger, records, simulation::Simulation};
 use photonstream_protocol::{
     AccessMode, ChannelName, FrameSource, ProtocolError, Publisher, Reading, SegmentSpec, StatisticsRecord,
-    Subscriber,
+    Subscriber, clean_one,
 };
 use serde::Serialize;
 use std::{hint::black_box, time::Instant};
@@ -77,6 +77,7 @@ impl Exchange {
             best.memcpy_us = best.memcpy_us.min(micros(begun));
         }
         publisher.close();
+        clean_one(&channel)?;
         Ok(best)
     }
 }

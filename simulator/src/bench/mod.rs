@@ -84,6 +84,7 @@ fn stream(simulation: &Simulation, threads: usize, time: Duration) -> Result<Thr
         let _ = stop.send(());
     })?;
     let summary = service::run(simulation, &options, &stopped)?;
+    photonstream_protocol::clean_one(&options.channel)?;
     // It only sleeps and sends.
     let _ = timer.join();
     let rate = |events: u64| events as f64 / summary.seconds;
