@@ -9,6 +9,7 @@ use photonstream_protocol::{
 use photonstream_simulator::{
     service::{self, Ending, Options, Summary},
     simulation::Simulation,
+    tracer::Tracer,
 };
 use std::{sync::Arc, thread::JoinHandle, time::Duration};
 
@@ -144,4 +145,21 @@ fn a_converged_scene_rests() {
     assert_eq!(subscriber.frame().unwrap().statistics.paths_total, frame.statistics.paths_total);
     assert_eq!(frame.statistics.pool_valid, frame.statistics.pool_paths);
     service.end();
+}
+
+/// A tracer that panics (its owner table is that of a smaller scene) ends the service with an error that names it,
+/// instead of leaving everybody else waiting for its batch.
+#[test]
+fn a_panic_ends_the_service() {
+    let small = room("replay");
+    let large = Simulation::new(Arc::new(support::closed_sphere(0.5, 1.0, 0.0, "vsls = 100")));
+    let tracer =
+        Tracer::new(Arc::clone(&large.scene), Arc::clone(&small.owners), Arc::clone(&large.emitters));
+    let broken = Simulation { tracer, ..large };
+    let channel: ChannelName = format!("t{}-panic", std::process::id()).parse().unwrap();
+    let (_stop, stopped) = flume::bounded(1);
+    let options = Options { channel: channel.clone(), threads: Some(2), after_paths: None };
+    let error = service::run(broken, &options, &stopped).unwrap_err();
+    assert!(error.to_string().contains("tracer"), "{error}");
+    photonstream_protocol::clean_one(&channel).unwrap();
 }

@@ -1,6 +1,7 @@
 //! Turns requests and signals into what the actors do, from their start to their end.
 
 use super::{
+    Farewell,
     ledger_actor::{LedgerActor, ToLedger},
     publisher_actor::{self, Still},
     spawn, tracer_actor,
@@ -73,7 +74,7 @@ pub fn run(
 enum Event {
     Stop,
     Request(Incoming),
-    LedgerGone,
+    ActorGone,
 }
 
 struct Director {
@@ -83,7 +84,7 @@ struct Director {
     to_ledger: flume::Sender<ToLedger>,
     latest_frame: Arc<AtomicU64>,
     ledger: JoinHandle<Counters>,
-    ledger_alive: flume::Receiver<()>,
+    actor_gone: flume::Receiver<()>,
     publisher: JoinHandle<Result<(), ProtocolError>>,
     tracers: Vec<JoinHandle<()>>,
 }
@@ -121,16 +122,22 @@ impl Director {
         for records in [place.clone(), place] {
             emptied_sender.send(records).expect("invariant: the channel holds two and has a receiver");
         }
+        let (farewells, actor_gone) = flume::bounded(1);
         let tracers = (0..threads)
             .map(|_| {
-                let (work, to_ledger) = (work.clone(), to_ledger.clone());
-                spawn("tracer", move || tracer_actor::run(&work, &to_ledger))
+                let (work, to_ledger, farewell) =
+                    (work.clone(), to_ledger.clone(), Farewell(farewells.clone()));
+                spawn("tracer", move || {
+                    let _farewell = farewell;
+                    tracer_actor::run(&work, &to_ledger);
+                })
             })
             .collect::<Result<_, _>>()?;
         let latest_frame = Arc::new(AtomicU64::new(0));
         let publisher = {
-            let latest_frame = Arc::clone(&latest_frame);
+            let (latest_frame, farewell) = (Arc::clone(&latest_frame), Farewell(farewells.clone()));
             spawn("publisher", move || {
+                let _farewell = farewell;
                 publisher_actor::run(publisher, &still, &snapshots, &emptied_sender, &latest_frame)
             })?
         };
@@ -143,12 +150,13 @@ impl Director {
             emptied,
             after_paths: options.after_paths,
         };
-        // Nothing is ever sent here: the ledger's end closes it, and the director sees that.
-        let (alive, ledger_alive) = flume::bounded(1);
-        let ledger = spawn("ledger", move || {
-            let _alive: flume::Sender<()> = alive;
-            actor.run()
-        })?;
+        let ledger = {
+            let farewell = Farewell(farewells.clone());
+            spawn("ledger", move || {
+                let _farewell = farewell;
+                actor.run()
+            })?
+        };
         Ok(Self {
             scene_name: scene.name.clone(),
             started: Instant::now(),
@@ -156,7 +164,7 @@ impl Director {
             to_ledger,
             latest_frame,
             ledger,
-            ledger_alive,
+            actor_gone,
             publisher,
             tracers,
         })
@@ -167,12 +175,12 @@ impl Director {
             let event = flume::Selector::new()
                 .recv(stop, |_| Event::Stop)
                 .recv(self.server.requests(), |request| request.map_or(Event::Stop, Event::Request))
-                .recv(&self.ledger_alive, |_| Event::LedgerGone)
+                .recv(&self.actor_gone, |_| Event::ActorGone)
                 .wait();
             match event {
                 Event::Stop => return Ok(Ending::Stopped),
-                // Its own result, or the publisher's, says why; `end` collects them.
-                Event::LedgerGone => return Ok(Ending::Stopped),
+                // An actor ended before its time; `end` finds out which, and why.
+                Event::ActorGone => return Ok(Ending::Stopped),
                 Event::Request(Incoming { request, replier, .. }) => {
                     let ends = matches!(request, Request::Shutdown);
                     let reply = self.answer(request);
@@ -224,12 +232,15 @@ impl Director {
     fn end(self, ending: Ending) -> Result<Summary, SimulatorError> {
         // The ledger may be gone already.
         let _ = self.to_ledger.send(ToLedger::Stop);
-        let counters = self.ledger.join().map_err(|_| SimulatorError::ActorStopped { actor: "ledger" })?;
+        let ledger = self.ledger.join();
         drop(self.to_ledger);
-        for tracer in self.tracers {
-            tracer.join().map_err(|_| SimulatorError::ActorStopped { actor: "tracer" })?;
-        }
-        self.publisher.join().map_err(|_| SimulatorError::ActorStopped { actor: "publisher" })??;
+        let tracers: Vec<_> = self.tracers.into_iter().map(JoinHandle::join).collect();
+        let publisher = self.publisher.join();
+        // All have ended before anything is said, so that the channel is free again.
+        let stopped = |actor| SimulatorError::ActorStopped { actor };
+        tracers.into_iter().collect::<Result<Vec<()>, _>>().map_err(|_| stopped("tracer"))?;
+        publisher.map_err(|_| stopped("publisher"))??;
+        let counters = ledger.map_err(|_| stopped("ledger"))?;
         let frames = self.latest_frame.load(Ordering::Acquire);
         Ok(Summary {
             scene: self.scene_name,

@@ -21,6 +21,16 @@ pub use ledger_actor::State;
 use crate::error::SimulatorError;
 use std::thread::JoinHandle;
 
+/// Tells the director when its thread ends, by return or by panic.
+struct Farewell(flume::Sender<()>);
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        // One message is enough, and nobody may be listening any more.
+        let _ = self.0.try_send(());
+    }
+}
+
 /// Starts a named thread.
 pub(crate) fn spawn<T: Send + 'static>(
     actor: &'static str,
