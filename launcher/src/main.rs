@@ -1,4 +1,5 @@
 //! Turns the command line into a run of `photonstream`.
+#![forbid(unsafe_code)]
 
 use std::process::ExitCode;
 

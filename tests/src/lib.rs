@@ -1,1 +1,2 @@
-//! What crosses processes: kill, restart, swap, reload.
+//! What crosses processes: kill, restart, swap of renderers.
+#![forbid(unsafe_code)]

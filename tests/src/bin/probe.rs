@@ -1,4 +1,5 @@
 //! Turns each frame of a channel into one line of JSON: a plug-in renderer, as somebody else would write it.
+#![forbid(unsafe_code)]
 
 use photonstream_protocol::{AccessMode, ChannelName, Liveness, ProtocolError, Reading, Subscriber};
 use std::{
