@@ -47,6 +47,7 @@ pub struct Publisher {
     text: String,
     text_words: Vec<u64>,
     process: u32,
+    abandoned: bool,
 }
 
 impl std::fmt::Debug for Publisher {
@@ -98,6 +99,7 @@ impl Publisher {
             text: String::new(),
             text_words: Vec::new(),
             process: std::process::id(),
+            abandoned: false,
         })
     }
 
@@ -215,8 +217,21 @@ impl Publisher {
         self.segment.layout.bytes
     }
 
-    /// Ends the channel: readers see `Retired` and keep the last frame. Dropping does the same.
+    /// Ends the channel: readers see `Retired` and keep the last frame. Dropping does the same, unless the thread panics:
+    /// then the channel is abandoned.
     pub fn close(self) {}
+
+    /// Leaves the channel as a crash would: readers see that the publisher is `Gone`, keep the last frame and wait for
+    /// its successor, which removes what is left here.
+    pub fn abandon(mut self) {
+        self.abandoned = true;
+    }
+
+    /// Whether someone has removed the names by which new readers find the segment (a clean-up of temporary files, the
+    /// end of a login session). The next [`Publisher::publish`] makes them anew.
+    pub fn names_are_lost(&self) -> bool {
+        self.heartbeat.name_is_lost()
+    }
 
     /// The number of the frame published last, for the control server's replies.
     pub(crate) fn frame_counter(&self) -> Arc<AtomicU64> {
@@ -241,7 +256,7 @@ impl Publisher {
 impl Drop for Publisher {
     fn drop(&mut self) {
         // A forked child must not end its parent's channel.
-        if self.process != std::process::id() {
+        if self.process != std::process::id() || self.abandoned || std::thread::panicking() {
             return;
         }
         self.segment.end(state::CLOSED);

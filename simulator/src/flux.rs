@@ -73,8 +73,8 @@ pub struct FluxReading {
     pub flux: Vec3,
     /// Standard error of the flux's mean channel in W, as if paths were independent; stratified samples have less.
     pub standard_error: f32,
-    /// Mean birth of the paths behind it, in ms since the simulation started; 0 where there are none.
-    pub mean_birth_ms: f64,
+    /// Mean birth of the paths behind it, in ms since the simulation started; `None` where there are none.
+    pub mean_birth_ms: Option<f64>,
 }
 
 /// What one unit of a column's mean path stands for.
@@ -157,7 +157,7 @@ impl VslFlux {
             count += cell.count;
             births += cell.births_ms;
         }
-        let mean_birth_ms = if count > 0 { births as f64 / count as f64 } else { 0.0 };
+        let mean_birth_ms = (count > 0).then(|| births as f64 / count as f64);
         FluxReading { flux: flux.as_vec3(), standard_error: variance.sqrt() as f32, mean_birth_ms }
     }
 }
@@ -195,7 +195,7 @@ mod tests {
         let scale = |watts| ColumnScale { watts, paths: 2 };
         let read = flux.read(1, &[scale(Vec3::ZERO), scale(Vec3::ONE)]);
         assert_eq!(read.flux, Vec3::new(2.5, 3.5, 5.5) * QUANTUM as f32);
-        assert_eq!(read.mean_birth_ms, 40.0);
+        assert_eq!(read.mean_birth_ms, Some(40.0));
         assert_eq!(flux.read(1, &[scale(Vec3::ONE), scale(Vec3::ZERO)]).flux, Vec3::ZERO);
         flux.subtract(1, &path, 40);
         assert_eq!(flux, empty);

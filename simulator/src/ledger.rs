@@ -106,8 +106,15 @@ impl Ledger {
         self.next_task - self.next_applied
     }
 
-    /// Whether every slot holds a path, none is on its way, and no more are wanted.
+    /// Whether every slot holds a path: the light is as good as the pool's size makes it. A stream of fresh samples goes
+    /// on from there; replayed samples are all traced.
     pub fn is_converged(&self) -> bool {
+        self.pool.valid().iter().sum::<u32>() == self.pool.slots()
+            && (self.sampling == Sampling::Fresh || self.in_flight() == 0)
+    }
+
+    /// Whether nothing is being traced and nothing is left to trace.
+    pub fn is_done(&self) -> bool {
         self.in_flight() == 0 && self.sampling == Sampling::Replay && self.next_run == self.runs.len()
     }
 

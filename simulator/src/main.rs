@@ -1,4 +1,5 @@
 //! The simulator as a program of its own: `photonstream-simulator CONFIG`.
+#![forbid(unsafe_code)]
 
 use clap::Parser;
 use photonstream_simulator::cli;

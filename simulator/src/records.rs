@@ -25,9 +25,8 @@ pub fn write_flux(records: &mut [VslRecord], readings: impl Iterator<Item = Flux
     for (record, reading) in records.iter_mut().zip(readings) {
         record.flux = reading.flux.to_array();
         record.standard_error = reading.standard_error;
-        let has_paths = reading.mean_birth_ms > 0.0;
         record.mean_age_s =
-            if has_paths { ((f64::from(now_ms) - reading.mean_birth_ms) / 1e3).max(0.0) as f32 } else { 0.0 };
+            reading.mean_birth_ms.map_or(0.0, |birth| ((f64::from(now_ms) - birth) / 1e3).max(0.0) as f32);
     }
 }
 

@@ -131,3 +131,19 @@ fn nothing_to_do_is_done_at_once() {
     assert!(ledger.is_converged());
     assert!(ledger.readings(&simulation.scene).all(|r| r.flux == Vec3::ZERO));
 }
+
+/// Lights of no power give exactly nothing, in a column of their own and in a shared one, though their slots are filled.
+#[test]
+fn no_power_is_exactly_no_flux() {
+    for columns in [1, 8] {
+        let lights: String = (0..3)
+            .map(|i| format!("[light.l{i}]\npower_w = 0\npoint = {{ position_m = [0.{i}, 0, 0.1] }}\n"))
+            .collect();
+        let (simulation, ledger) = filled(support::scene(&format!(
+            "[material.a]\nalbedo = 0.5\n[object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [2, 2, 2] }}\n\
+             {lights}[streaming]\nvsls = 50\npool_paths = 3000\nlight_columns = {columns}\n"
+        )));
+        assert_eq!(ledger.counters().paths, 3000);
+        assert!(ledger.readings(&simulation.scene).all(|r| r.flux == Vec3::ZERO && r.standard_error == 0.0));
+    }
+}

@@ -4,7 +4,7 @@
 mod support;
 
 use photonstream_protocol::{
-    AccessMode, ChannelName, ControlClient, Reading, Reply, Request, Subscriber, VslFrame,
+    AccessMode, ChannelName, ControlClient, Liveness, Reading, Reply, Request, Subscriber, VslFrame,
 };
 use photonstream_simulator::{
     service::{self, Ending, Options, Summary},
@@ -48,17 +48,18 @@ impl Service {
     }
 }
 
-/// The first frame that says that the light has converged.
-fn converged(subscriber: &mut Subscriber) -> VslFrame {
+/// The first frame that shows so many paths and says that the light has converged.
+fn after(subscriber: &mut Subscriber, paths: u64) -> VslFrame {
     let deadline = std::time::Instant::now() + PATIENCE;
     while std::time::Instant::now() < deadline {
-        if subscriber.read().unwrap() == Reading::New && subscriber.frame().unwrap().statistics.converged == 1
-        {
-            return subscriber.frame().unwrap().clone();
+        let new = subscriber.read().unwrap() == Reading::New;
+        let done = |f: &&VslFrame| f.statistics.converged == 1 && f.statistics.paths_total == paths;
+        if let Some(frame) = subscriber.frame().filter(|_| new).filter(done) {
+            return frame.clone();
         }
         subscriber.wait(Duration::from_millis(50));
     }
-    panic!("no converged frame within {PATIENCE:?}");
+    panic!("no converged frame of {paths} paths within {PATIENCE:?}");
 }
 
 fn room(sampling: &str) -> Simulation {
@@ -87,7 +88,7 @@ fn frames_hold_the_same_flux_on_any_number_of_threads() {
         let expected: Vec<[f32; 3]> = ledger.readings(&simulation.scene).map(|r| r.flux.to_array()).collect();
         for threads in [1, 3] {
             let service = start(&format!("{sampling}{threads}"), &simulation, threads, paths);
-            let frame = converged(&mut service.attach());
+            let frame = after(&mut service.attach(), ledger.counters().paths);
             let flux: Vec<[f32; 3]> = frame.vsls.iter().map(|v| v.flux).collect();
             assert!(flux == expected, "{sampling} on {threads} threads");
             assert_eq!(frame.scene_hash, simulation.scene.hash);
@@ -139,7 +140,7 @@ fn the_control_socket_pauses_steps_resumes_tells_and_ends() {
 fn a_converged_scene_rests() {
     let service = start("rest", &room("replay"), 2, None);
     let mut subscriber = service.attach();
-    let frame = converged(&mut subscriber);
+    let frame = after(&mut subscriber, 30_000);
     std::thread::sleep(Duration::from_secs(1));
     assert_eq!(subscriber.read().unwrap(), Reading::Unchanged);
     assert_eq!(subscriber.frame().unwrap().statistics.paths_total, frame.statistics.paths_total);
@@ -161,5 +162,8 @@ fn a_panic_ends_the_service() {
     let options = Options { channel: channel.clone(), threads: Some(2), after_paths: None };
     let error = service::run(broken, &options, &stopped).unwrap_err();
     assert!(error.to_string().contains("tracer"), "{error}");
+    // Left as a crash leaves it: renderers wait for a successor.
+    let subscriber = Subscriber::attach(&channel, AccessMode::Mapped);
+    assert!(subscriber.is_err() || !matches!(subscriber.unwrap().liveness(), Liveness::Retired));
     photonstream_protocol::clean_one(&channel).unwrap();
 }

@@ -134,7 +134,12 @@ impl Part {
         let [a, b, c] = geometry.rest_triangle(triangle);
         let (edge_u, edge_v) = (b - a, c - a);
         let count = |edge: Vec3| (edge.length() / cell_edge).ceil().clamp(1.0, MOST_CELLS);
+        // A sliver has long edges and hardly any area: cells by its edges alone would be thousands, all but a few outside.
         let (columns, rows) = (count(edge_u), count(edge_v));
+        let area = edge_u.cross(edge_v).length() / (cell_edge * cell_edge);
+        let most = (4.0 * area + 2.0 * (columns + rows)).max(1.0);
+        let fewer = (most / (columns * rows)).min(1.0).sqrt();
+        let (columns, rows) = ((columns * fewer).ceil(), (rows * fewer).ceil());
         let grid = Grid { first: self.cells.len() as u32, columns: columns as u16, rows: rows as u16 };
         let (step_u, step_v) = (edge_u / columns, edge_v / rows);
         let radius = 0.5 * (step_u + step_v).length().max((step_u - step_v).length());

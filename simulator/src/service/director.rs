@@ -2,11 +2,12 @@
 
 use super::{
     Farewell,
-    ledger_actor::{LedgerActor, ToLedger},
-    publisher_actor::{self, Still},
+    ledger_actor::{Change, LedgerActor, ToLedger},
+    publisher_actor::{PublisherActor, RECORD_SETS, Still},
     spawn, tracer_actor,
 };
 use crate::{counters::Counters, error::SimulatorError, records, simulation::Simulation};
+use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
     ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, SegmentSpec,
 };
@@ -14,7 +15,7 @@ use serde::Serialize;
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
@@ -67,7 +68,7 @@ pub fn run(
     stop: &flume::Receiver<()>,
 ) -> Result<Summary, SimulatorError> {
     let director = Director::start(simulation, options)?;
-    let ending = director.direct(stop)?;
+    let ending = director.direct(stop);
     director.end(ending)
 }
 
@@ -83,6 +84,7 @@ struct Director {
     server: ControlServer,
     to_ledger: flume::Sender<ToLedger>,
     latest_frame: Arc<AtomicU64>,
+    orderly: Arc<AtomicBool>,
     ledger: JoinHandle<Counters>,
     actor_gone: flume::Receiver<()>,
     publisher: JoinHandle<Result<(), ProtocolError>>,
@@ -117,10 +119,9 @@ impl Director {
         let (work_sender, work) = flume::bounded(2 * threads + 2);
         let (to_ledger, inbox) = flume::bounded(4 * threads + 16);
         let (snapshot_sender, snapshots) = flume::bounded(1);
-        // Two sets of records go round: one is filled while the other is published.
-        let (emptied_sender, emptied) = flume::bounded(2);
-        for records in [place.clone(), place] {
-            emptied_sender.send(records).expect("invariant: the channel holds two and has a receiver");
+        let emptied = Arc::new(ArrayQueue::new(RECORD_SETS));
+        for records in std::iter::repeat_n(place, RECORD_SETS) {
+            emptied.push(records).expect("invariant: the queue has room for all sets of records");
         }
         let (farewells, actor_gone) = flume::bounded(1);
         let tracers = (0..threads)
@@ -134,11 +135,20 @@ impl Director {
             })
             .collect::<Result<_, _>>()?;
         let latest_frame = Arc::new(AtomicU64::new(0));
+        let orderly = Arc::new(AtomicBool::new(false));
+        let actor = PublisherActor {
+            publisher,
+            still,
+            snapshots,
+            emptied: Arc::clone(&emptied),
+            latest_frame: Arc::clone(&latest_frame),
+            orderly: Arc::clone(&orderly),
+        };
         let publisher = {
-            let (latest_frame, farewell) = (Arc::clone(&latest_frame), Farewell(farewells.clone()));
+            let farewell = Farewell(farewells.clone());
             spawn("publisher", move || {
                 let _farewell = farewell;
-                publisher_actor::run(publisher, &still, &snapshots, &emptied_sender, &latest_frame)
+                actor.run()
             })?
         };
         let actor = LedgerActor {
@@ -163,6 +173,7 @@ impl Director {
             server,
             to_ledger,
             latest_frame,
+            orderly,
             ledger,
             actor_gone,
             publisher,
@@ -170,23 +181,24 @@ impl Director {
         })
     }
 
-    fn direct(&self, stop: &flume::Receiver<()>) -> Result<Ending, SimulatorError> {
+    /// Until it is time to end; `None` if an actor ended before.
+    fn direct(&self, stop: &flume::Receiver<()>) -> Option<Ending> {
         loop {
             let event = flume::Selector::new()
                 .recv(stop, |_| Event::Stop)
-                .recv(self.server.requests(), |request| request.map_or(Event::Stop, Event::Request))
+                .recv(self.server.requests(), |request| request.map_or(Event::ActorGone, Event::Request))
                 .recv(&self.actor_gone, |_| Event::ActorGone)
                 .wait();
             match event {
-                Event::Stop => return Ok(Ending::Stopped),
+                Event::Stop => return Some(Ending::Stopped),
                 // An actor ended before its time; `end` finds out which, and why.
-                Event::ActorGone => return Ok(Ending::Stopped),
+                Event::ActorGone => return None,
                 Event::Request(Incoming { request, replier, .. }) => {
                     let ends = matches!(request, Request::Shutdown);
                     let reply = self.answer(request);
                     replier.reply(reply);
                     if ends {
-                        return Ok(Ending::Shutdown);
+                        return Some(Ending::Shutdown);
                     }
                 }
             }
@@ -194,27 +206,16 @@ impl Director {
     }
 
     fn answer(&self, request: Request) -> Reply {
-        let tell = |message| match self.to_ledger.send(message) {
-            // The next frame is the first that can show it.
-            Ok(()) => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) + 1 },
-            Err(_) => Reply::error("ending", "the simulation is ending"),
-        };
         match request {
-            Request::Pause => tell(ToLedger::Pause),
-            Request::Resume => tell(ToLedger::Resume),
-            Request::Step => tell(ToLedger::Step),
+            Request::Pause => self.change(Change::Pause),
+            Request::Resume => self.change(Change::Resume),
+            Request::Step => self.change(Change::Step),
             Request::Shutdown => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
-            Request::Query => {
-                let (sender, receiver) = flume::bounded(1);
-                let asked = self.to_ledger.send(ToLedger::Query(sender)).is_ok();
-                match receiver.recv_timeout(Duration::from_secs(2)) {
-                    Ok(state) if asked => match serde_json::to_value(state) {
-                        Ok(state) => Reply::State { state },
-                        Err(error) => Reply::error("internal", error.to_string()),
-                    },
-                    _ => Reply::error("busy", "the simulation did not answer within 2 s; try again"),
-                }
-            }
+            Request::Query => match self.ask(ToLedger::Query).map(serde_json::to_value) {
+                Some(Ok(state)) => Reply::State { state },
+                Some(Err(error)) => Reply::error("internal", error.to_string()),
+                None => Self::busy(),
+            },
             other => {
                 let name = format!("{other:?}");
                 let name = name.split([' ', '{', '(']).next().unwrap_or_default().to_owned();
@@ -228,8 +229,28 @@ impl Director {
         }
     }
 
+    fn change(&self, change: Change) -> Reply {
+        match self.ask(|sender| ToLedger::Change(change, sender)) {
+            Some(frame) => Reply::Ok { frame },
+            None => Self::busy(),
+        }
+    }
+
+    /// What the ledger answers; `None` if it does not.
+    fn ask<T>(&self, question: impl FnOnce(flume::Sender<T>) -> ToLedger) -> Option<T> {
+        let (sender, answer) = flume::bounded(1);
+        self.to_ledger.send(question(sender)).ok()?;
+        answer.recv_timeout(Duration::from_secs(2)).ok()
+    }
+
+    fn busy() -> Reply {
+        Reply::error("busy", "the simulation did not answer within 2 s; try again")
+    }
+
     /// Ends all actors and collects what they have to say.
-    fn end(self, ending: Ending) -> Result<Summary, SimulatorError> {
+    fn end(self, ending: Option<Ending>) -> Result<Summary, SimulatorError> {
+        // Pairs with the publisher's load.
+        self.orderly.store(ending.is_some(), Ordering::Release);
         // The ledger may be gone already.
         let _ = self.to_ledger.send(ToLedger::Stop);
         let ledger = self.ledger.join();
@@ -241,6 +262,7 @@ impl Director {
         tracers.into_iter().collect::<Result<Vec<()>, _>>().map_err(|_| stopped("tracer"))?;
         publisher.map_err(|_| stopped("publisher"))??;
         let counters = ledger.map_err(|_| stopped("ledger"))?;
+        let ending = ending.ok_or_else(|| stopped("control server"))?;
         let frames = self.latest_frame.load(Ordering::Acquire);
         Ok(Summary {
             scene: self.scene_name,

@@ -8,6 +8,7 @@ use crate::{
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
 };
+use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{StatisticsRecord, VslRecord, monotonic_ns};
 use serde::Serialize;
 use std::{
@@ -19,16 +20,23 @@ use std::{
 pub(super) enum ToLedger {
     /// A tracer has finished a task.
     Finished { task: Task, batch: PathBatch },
+    /// Change what is done; the answer is the number of the first frame that shows it.
+    Change(Change, flume::Sender<u64>),
+    /// Tell the present state.
+    Query(flume::Sender<State>),
+    /// End.
+    Stop,
+}
+
+/// What the ledger can be told to do.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
     /// Stop handing out work.
     Pause,
     /// Go on.
     Resume,
     /// While paused: go on until the next frame.
     Step,
-    /// Tell the present state.
-    Query(flume::Sender<State>),
-    /// End.
-    Stop,
 }
 
 /// What `query` answers: the simulator's present state.
@@ -40,7 +48,7 @@ pub struct State {
     pub scene_hash: String,
     /// Whether the simulation is paused.
     pub paused: bool,
-    /// Whether all light that the settings ask for has been traced.
+    /// Whether every slot of the pool holds a path: the light is as good as the pool's size makes it.
     pub converged: bool,
     /// Number of virtual surface lights.
     pub vsls: usize,
@@ -71,7 +79,7 @@ pub(super) struct LedgerActor {
     pub(super) inbox: flume::Receiver<ToLedger>,
     pub(super) work: flume::Sender<Work>,
     pub(super) snapshots: flume::Sender<Snapshot>,
-    pub(super) emptied: flume::Receiver<Vec<VslRecord>>,
+    pub(super) emptied: Arc<ArrayQueue<Vec<VslRecord>>>,
     /// Stop handing out work after this many paths.
     pub(super) after_paths: Option<u64>,
 }
@@ -86,6 +94,9 @@ struct Progress {
     /// Something differs from the last published frame.
     changed: bool,
     next_frame: Instant,
+    /// Snapshots sent, each of which becomes a frame.
+    frames: u64,
+    traced_ns: u64,
     paths_given: u64,
     /// Time in which there was work, and since when there is.
     active: Duration,
@@ -106,6 +117,8 @@ impl LedgerActor {
             stepping: false,
             changed: true,
             next_frame: started + period,
+            frames: 0,
+            traced_ns: 0,
             paths_given: 0,
             active: Duration::ZERO,
             active_since: None,
@@ -164,7 +177,7 @@ impl LedgerActor {
 
     fn is_done(&self, progress: &Progress) -> bool {
         let limited = self.after_paths.is_some_and(|limit| progress.paths_given >= limit);
-        progress.ledger.is_converged() || (limited && progress.ledger.in_flight() == 0)
+        progress.ledger.is_done() || (limited && progress.ledger.in_flight() == 0)
     }
 
     /// False where it is time to end.
@@ -172,19 +185,21 @@ impl LedgerActor {
         match message {
             ToLedger::Finished { task, batch } => {
                 let birth_ms = progress.now_ms();
+                progress.traced_ns = monotonic_ns();
                 progress.spare.extend(progress.ledger.apply(task, batch, birth_ms));
                 progress.changed = true;
             }
-            ToLedger::Pause => {
-                progress.changed |= !progress.paused;
-                progress.paused = true;
+            ToLedger::Change(change, reply) => {
+                match change {
+                    Change::Pause => progress.paused = true,
+                    Change::Resume => progress.paused = false,
+                    Change::Step => {}
+                }
+                progress.stepping = progress.paused && matches!(change, Change::Step);
+                // A frame follows in any case, so that whoever waits for it does not wait for ever.
+                progress.changed = true;
+                let _ = reply.send(progress.frames + 1);
             }
-            ToLedger::Resume => {
-                progress.changed |= progress.paused;
-                progress.paused = false;
-                progress.stepping = false;
-            }
-            ToLedger::Step => progress.stepping = progress.paused,
             ToLedger::Query(reply) => {
                 // Whoever asked may have gone.
                 let _ = reply.send(self.state(progress));
@@ -195,17 +210,18 @@ impl LedgerActor {
     }
 
     fn publish(&self, progress: &mut Progress, converged: bool, period: Duration) -> Published {
-        let Ok(mut vsls) = self.emptied.try_recv() else { return Published::Later };
+        let Some(mut vsls) = self.emptied.pop() else { return Published::Later };
         let begun = Instant::now();
         let scene = &self.simulation.scene;
         records::write_flux(&mut vsls, progress.ledger.readings(scene), progress.now_ms());
-        let statistics = self.statistics(progress, converged);
+        let statistics = self.statistics(progress, converged || progress.ledger.is_converged());
         let snapshot = Snapshot { vsls, statistics, paused: progress.paused };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }
         let now = Instant::now();
         progress.next_frame = now + period.max((now - begun) * PUBLISHING_SHARE);
+        progress.frames += 1;
         progress.changed = false;
         progress.stepping = false;
         Published::Yes
@@ -226,7 +242,7 @@ impl LedgerActor {
             converged: u64::from(converged),
             simulation_time_s: uptime,
             threads: self.threads as u64,
-            traced_ns: monotonic_ns(),
+            traced_ns: progress.traced_ns,
             ..StatisticsRecord::default()
         };
         records::write_counters(&mut statistics, &counters);
@@ -234,7 +250,8 @@ impl LedgerActor {
     }
 
     fn state(&self, progress: &Progress) -> State {
-        let statistics = self.statistics(progress, self.is_done(progress));
+        let converged = self.is_done(progress) || progress.ledger.is_converged();
+        let statistics = self.statistics(progress, converged);
         State {
             scene: self.simulation.scene.name.clone(),
             scene_hash: format!("{:016x}", self.simulation.scene.hash),

@@ -1,14 +1,18 @@
 //! Turns snapshots of the ledger into frames in shared memory.
 
+use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
     FrameSource, LightRecord, ObjectRecord, ProtocolError, Publisher, StatisticsRecord, VslRecord,
 };
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    time::Duration,
 };
 
-/// What the ledger wants published. The vectors come back to it, to be filled again.
+/// What the ledger wants published.
 pub(super) struct Snapshot {
     pub(super) vsls: Vec<VslRecord>,
     pub(super) statistics: StatisticsRecord,
@@ -22,34 +26,78 @@ pub(super) struct Still {
     pub(super) scene_text: Arc<str>,
 }
 
-/// Publishes snapshots until the ledger is gone, and then closes the channel.
-pub(super) fn run(
-    mut publisher: Publisher,
-    still: &Still,
-    snapshots: &flume::Receiver<Snapshot>,
-    emptied: &flume::Sender<Vec<VslRecord>>,
-    latest_frame: &AtomicU64,
-) -> Result<(), ProtocolError> {
-    let mut paused = false;
-    while let Ok(snapshot) = snapshots.recv() {
-        if paused != snapshot.paused {
-            paused = snapshot.paused;
-            publisher.set_paused(paused);
+/// Sets of records that go round between ledger and publisher: one is filled, one is published, and the last one
+/// published is kept to be published again.
+pub(super) const RECORD_SETS: usize = 3;
+
+/// How often a resting publisher looks whether its names are still there.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Publishes what the ledger sends, and owns the channel.
+pub(super) struct PublisherActor {
+    pub(super) publisher: Publisher,
+    pub(super) still: Still,
+    pub(super) snapshots: flume::Receiver<Snapshot>,
+    /// Records that the ledger may fill again.
+    pub(super) emptied: Arc<ArrayQueue<Vec<VslRecord>>>,
+    pub(super) latest_frame: Arc<AtomicU64>,
+    /// Set before an orderly end; without it the channel is left as a crash leaves it, so that renderers wait for the
+    /// simulator to come back instead of taking a half-lit frame for the last.
+    pub(super) orderly: Arc<AtomicBool>,
+}
+
+impl PublisherActor {
+    /// Publishes until the ledger is gone, and then ends the channel.
+    pub(super) fn run(mut self) -> Result<(), ProtocolError> {
+        let result = self.publish_all();
+        // Set before the ledger was told to end, which is what ended the snapshots.
+        if result.is_ok() && self.orderly.load(Ordering::Acquire) {
+            self.publisher.close();
+        } else {
+            self.publisher.abandon();
         }
-        let frame = publisher.publish(&FrameSource {
+        result
+    }
+
+    fn publish_all(&mut self) -> Result<(), ProtocolError> {
+        let mut last: Option<Snapshot> = None;
+        loop {
+            match self.snapshots.recv_timeout(LOOK) {
+                Ok(snapshot) => {
+                    if last.as_ref().is_some_and(|last| last.paused) != snapshot.paused {
+                        self.publisher.set_paused(snapshot.paused);
+                    }
+                    self.publish(&snapshot)?;
+                    if let Some(old) = last.replace(snapshot) {
+                        // There are as many places as sets of records.
+                        let _ = self.emptied.push(old.vsls);
+                    }
+                }
+                Err(flume::RecvTimeoutError::Timeout) => {
+                    if let Some(last) = last.as_ref().filter(|_| self.publisher.names_are_lost()) {
+                        tracing::warn!(
+                            "the channel's names were removed by someone: publishing under new ones"
+                        );
+                        self.publish(last)?;
+                    }
+                }
+                Err(flume::RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+        }
+    }
+
+    fn publish(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
+        let frame = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls,
             changed: None,
-            objects: &still.objects,
-            lights: &still.lights,
+            objects: &self.still.objects,
+            lights: &self.still.lights,
             statistics: &snapshot.statistics,
-            scene_text: &still.scene_text,
+            scene_text: &self.still.scene_text,
             config_generation: 1,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;
-        latest_frame.store(frame, Ordering::Release);
-        // The ledger may be gone already; the memory is then no longer wanted.
-        let _ = emptied.try_send(snapshot.vsls);
+        self.latest_frame.store(frame, Ordering::Release);
+        Ok(())
     }
-    publisher.close();
-    Ok(())
 }
