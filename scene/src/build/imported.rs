@@ -53,6 +53,7 @@ pub(super) fn read(
     })?;
     let import = load_obj(&file)
         .map_err(|(file, problem)| asset_error(file, problem, "export it anew, or remove the object"))?;
+    let overridden = object.material.is_some();
     if let Some(problem) = &import.material_problem {
         if object.material.is_none() {
             let remedy = "repair it, or give the object a `material`";
@@ -68,7 +69,7 @@ pub(super) fn read(
         if excluded.contains(&format!("{group}/{material}")) {
             continue;
         }
-        let surface = surface(name, &material, import.materials.get(&material), context.notices)
+        let surface = surface(name, &material, import.materials.get(&material), overridden, context.notices)
             .map_err(|problem| asset_error(file.clone(), problem, "repair the material file"))?;
         let part = part(
             Source {
@@ -141,11 +142,12 @@ fn part<'a>(
     }
 }
 
-/// The validated surface of an imported material.
+/// The validated surface of an imported material; what it reflects does not matter if it is `overridden`.
 fn surface(
     object: &str,
     name: &str,
     material: Option<&ImportedMaterial>,
+    overridden: bool,
     notices: &mut Vec<String>,
 ) -> Result<ImportedMaterial, String> {
     let mut note = |what: String| {
@@ -155,7 +157,9 @@ fn surface(
         }
     };
     let Some(material) = material else {
-        note(format!("faces without a known material have albedo {DEFAULT_ALBEDO}"));
+        if !overridden {
+            note(format!("faces without a known material have albedo {DEFAULT_ALBEDO}"));
+        }
         return Ok(ImportedMaterial {
             albedo: DVec3::splat(DEFAULT_ALBEDO),
             radiance: DVec3::ZERO,
