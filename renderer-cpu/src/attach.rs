@@ -37,8 +37,8 @@ pub enum Ended {
 /// A picture that has just been written.
 #[derive(Clone, Copy, Debug)]
 pub struct Written<'a> {
-    /// Its number, from 1.
-    pub number: u32,
+    /// Its number, from `Args::first`.
+    pub number: u64,
     /// The published frame that it shows.
     pub frame: u64,
     /// Its files, the EXR first.
@@ -187,9 +187,9 @@ impl Run<'_> {
     }
 
     fn write(&mut self, last: Last) -> Result<(), RenderError> {
-        let number = self.pictures + 1;
+        let number = u64::from(self.args.first) + u64::from(self.pictures);
         let files = write_files(self.args, number, &last.rendered.film, &last.settings)?;
-        self.pictures = number;
+        self.pictures += 1;
         (self.written)(&Written { number, frame: last.frame, files: &files, stats: &last.rendered.stats });
         self.last = Some(last);
         Ok(())
@@ -199,7 +199,7 @@ impl Run<'_> {
 /// Writes all layers as one EXR, and each as a PNG; the first PNG has the plain name, others that of their layer.
 fn write_files(
     args: &Args,
-    number: u32,
+    number: u64,
     film: &Film,
     settings: &RenderSettings,
 ) -> Result<Vec<PathBuf>, RenderError> {

@@ -21,6 +21,9 @@ pub struct Args {
     /// Pictures to write as the light goes on, then end; without it, one picture once the light has converged.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: Option<u32>,
+    /// Number of the first picture, for going on with earlier ones.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub first: u32,
     /// Picture size in pixels, such as 800x600; the scene's own if not given.
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
@@ -101,13 +104,13 @@ mod tests {
         let args = Command::try_parse_from(["r"]).unwrap().args;
         assert_eq!(args.options(&settings), RenderOptions::from_settings(&settings));
         let line = "r --channel a-1 --out x --headless --frames 3 --size 64x48 --kernel paper --visibility none \
-                    --show full,normal --samples 4 --threads 2";
+                    --show full,normal --samples 4 --threads 2 --first 12";
         let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
         let options = args.options(&settings);
         assert_eq!((options.width, options.height, options.samples_per_pixel), (64, 48, 4));
         assert_eq!((options.kernel, options.visibility), (Kernel::Paper, Visibility::None));
         assert_eq!(options.layers, [LayerKind::Full, LayerKind::Normal]);
-        assert_eq!((args.frames, options.threads), (Some(3), Some(2)));
+        assert_eq!((args.frames, args.first, options.threads), (Some(3), 12, Some(2)));
     }
 
     #[test]
@@ -118,6 +121,7 @@ mod tests {
             ("r --kernel box", "paper, disc"),
             ("r --show ful", "full, direct, indirect"),
             ("r --frames 0", "0 is not in 1.."),
+            ("r --first 0", "0 is not in 1.."),
         ] {
             let Err(error) = Command::try_parse_from(line.split_whitespace()) else { panic!("{line}") };
             assert!(error.to_string().contains(expected), "{error}");

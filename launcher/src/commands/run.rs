@@ -6,7 +6,9 @@ use crate::{
     error::LauncherError,
     follow, output,
     pictures::Look,
-    supervise::{BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Supervisor, find_plug_in},
+    supervise::{
+        BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Sequence, Supervisor, find_plug_in, written_since,
+    },
 };
 use photonstream_protocol::ChannelName;
 use photonstream_scene::SceneConfig;
@@ -23,7 +25,7 @@ use std::{
 #[command(after_help = "\
 A renderer NAME that is not built in (cpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
 called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V].
-What crashes is started again. Several renderers write to folders of their own in DIR.
+What crashes is started again; a built-in renderer then goes on with the next picture. Several renderers write to folders of their own in DIR.
 Ctrl-C ends all processes in order, a second one at once.
 
 Examples:
@@ -78,8 +80,6 @@ struct Renderer {
 const LOOK: Duration = Duration::from_millis(50);
 /// The same, until there is a first frame.
 const FIRST_LOOK: Duration = Duration::from_millis(4);
-/// So long may renderers take to finish after the simulation has ended in order.
-const LAST_PICTURE: Duration = Duration::from_secs(30);
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let begun = (Instant::now(), SystemTime::now());
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let folders = folders(&args.out, &args.renderers);
     let named = args.renderers.iter().zip(&folders);
     let renderers = named
-        .map(|(name, folder)| renderer(name, folder, &channel, args, global))
+        .map(|(name, folder)| renderer(name, folder, &channel, begun.1, args, global))
         .collect::<Result<_, _>>()?;
     for folder in &folders {
         std::fs::create_dir_all(folder).map_err(|e| LauncherError::io("create folder", folder, e))?;
@@ -152,7 +152,9 @@ fn watch(
                 let what = "its first frame";
                 return Err(LauncherError::SimulatorEnded { channel: channel.to_string(), what });
             }
-            tracing::info!("the simulation was ended; waiting for the last pictures");
+            tracing::info!(
+                "the simulation was ended; waiting for the last pictures, Ctrl-C ends without them"
+            );
             return last_pictures(supervisor);
         }
         supervisor.attend(if renderers.is_empty() { LOOK } else { FIRST_LOOK })?;
@@ -165,9 +167,10 @@ fn watch(
     Ok(())
 }
 
+/// Waits for renderers to show what they have, for as long as they take.
 fn last_pictures(supervisor: &mut Supervisor) -> Result<(), LauncherError> {
-    let deadline = Instant::now() + LAST_PICTURE;
-    while !supervisor.is_over(Kind::Renderer) && Instant::now() < deadline {
+    while !supervisor.is_over(Kind::Renderer) {
+        supervisor.give_up_restarts("there is no light left to start it again for");
         supervisor.attend(LOOK)?;
     }
     Ok(())
@@ -183,6 +186,7 @@ fn renderer(
     name: &str,
     folder: &Path,
     channel: &ChannelName,
+    begun: SystemTime,
     args: &Args,
     global: &Global,
 ) -> Result<Role, LauncherError> {
@@ -196,7 +200,14 @@ fn renderer(
     };
     arguments.extend(["--channel".into(), channel.as_str().into(), "--out".into(), folder.into()]);
     arguments.push("--headless".into());
-    arguments.extend(args.frames.iter().flat_map(|n| ["--frames".into(), n.to_string().into()]));
+    // A plug-in numbers its pictures, if it has any, in its own way.
+    let sequence = match &plug_in {
+        None => Some(Sequence { folder: folder.to_owned(), begun, frames: args.frames }),
+        Some(_) => {
+            arguments.extend(args.frames.iter().flat_map(|n| ["--frames".into(), n.to_string().into()]));
+            None
+        }
+    };
     arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
     // With several renderers their folders are named after them, and told apart.
     let shown = if args.renderers.len() == 1 {
@@ -204,7 +215,7 @@ fn renderer(
     } else {
         folder.file_name().unwrap_or_default().to_string_lossy()
     };
-    Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments })
+    Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments, sequence })
 }
 
 /// Where each renderer writes: `out`, or with several of them `out/NAME`, `out/NAME-2` …
@@ -224,10 +235,7 @@ fn pictures_in(folder: &Path, begun: SystemTime) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let is_new = |path: &PathBuf| {
         let end = path.extension().and_then(|e| e.to_str());
-        // Some file systems count time in coarse steps.
-        let since = begun - Duration::from_millis(20);
-        matches!(end, Some("exr" | "png" | "ppm"))
-            && path.metadata().and_then(|m| m.modified()).is_ok_and(|time| time >= since)
+        matches!(end, Some("exr" | "png" | "ppm")) && written_since(path, begun)
     };
     let mut pictures: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_new).collect();
     pictures.sort();

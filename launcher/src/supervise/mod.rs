@@ -6,9 +6,11 @@
 mod backoff;
 mod process;
 mod role;
+mod sequence;
 mod voice;
 
 pub(crate) use role::{BUILT_IN_RENDERERS, Kind, Role, find_plug_in};
+pub(crate) use sequence::{Sequence, written_since};
 pub(crate) use voice::ChildOutput;
 
 use crate::{
@@ -82,19 +84,25 @@ impl Supervisor {
         }
         let mut given_up = None;
         for process in &mut self.processes {
-            match process.look() {
+            match process.look().and_then(|()| process.start_if_due(self.output)) {
                 Err(error) if process.is(Kind::Simulator) => return Err(error),
                 Err(error) => {
                     given_up = Some(process.role.name.clone());
                     self.failures.push(error);
                 }
-                Ok(()) => process.start_if_due(self.output)?,
+                Ok(()) => {}
             }
         }
         if let Some(name) = given_up.filter(|_| !self.is_over(Kind::Renderer)) {
             tracing::warn!("{name} is given up; the others go on");
         }
         Ok(())
+    }
+
+    /// Gives up the renderers that wait to be started again, and says `why`.
+    pub(crate) fn give_up_restarts(&mut self, why: &str) {
+        let renderers = self.processes.iter_mut().filter(|p| p.is(Kind::Renderer));
+        self.failures.extend(renderers.filter_map(|p| p.give_up_restart(why)));
     }
 
     /// Whether all processes of a kind have ended and will not be started again.

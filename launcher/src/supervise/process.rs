@@ -3,11 +3,13 @@
 use super::{
     backoff::{Backoff, Verdict},
     role::{Kind, Role},
+    sequence::Sequence,
     voice::{ChildOutput, Voice},
 };
 use crate::{error::LauncherError, exit};
 use rustix::process::{Pid, Signal, kill_process};
 use std::{
+    ffi::OsString,
     os::unix::process::ExitStatusExt,
     process::{Child, ExitStatus},
     time::{Duration, Instant},
@@ -37,7 +39,8 @@ pub(super) struct Process {
 
 impl Process {
     pub(super) fn start(role: Role, output: ChildOutput) -> Result<Self, LauncherError> {
-        let state = spawn(&role, output)?;
+        let first = role.sequence.as_ref().map_or_else(Vec::new, Sequence::whole);
+        let state = spawn(&role, &first, output)?;
         Ok(Self { role, state, restarts: 0, crashed: false, backoff: Backoff::default() })
     }
 
@@ -92,13 +95,48 @@ impl Process {
         }
     }
 
-    /// Starts it again if the time has come.
+    /// Starts it again if the time has come. The error is that of a process that cannot be started any more.
     pub(super) fn start_if_due(&mut self, output: ChildOutput) -> Result<(), LauncherError> {
-        if matches!(self.state, State::Waiting { until } if until <= Instant::now()) {
-            self.state = spawn(&self.role, output)?;
-            self.restarts += 1;
+        if !matches!(self.state, State::Waiting { until } if until <= Instant::now()) {
+            return Ok(());
         }
-        Ok(())
+        let Some(rest) = self.role.sequence.as_ref().map_or_else(|| Some(Vec::new()), Sequence::rest) else {
+            tracing::info!("{} has written all its pictures and is not started again", self.role.name);
+            self.state = State::Done;
+            return Ok(());
+        };
+        match spawn(&self.role, &rest, output) {
+            Ok(state) => {
+                self.state = state;
+                self.restarts += 1;
+                Ok(())
+            }
+            Err(error) => self.not_started(&error),
+        }
+    }
+
+    /// What prevents a start may pass, like a lack of memory: tried as often as one that never comes up.
+    fn not_started(&mut self, error: &LauncherError) -> Result<(), LauncherError> {
+        match self.backoff.failed(Duration::ZERO, None) {
+            Verdict::Retry(pause) => {
+                tracing::warn!("{error}; trying again");
+                self.state = State::Waiting { until: Instant::now() + pause };
+                Ok(())
+            }
+            Verdict::GiveUp => {
+                self.state = State::Failed;
+                let (name, how) = (self.role.name.clone(), "could not be started again".into());
+                Err(LauncherError::Child { name, how, said: vec![error.to_string()], code: exit::CHILD })
+            }
+        }
+    }
+
+    /// Lets it wait no more for its restart; its failure, if it did.
+    pub(super) fn give_up_restart(&mut self, why: &str) -> Option<LauncherError> {
+        let State::Waiting { .. } = self.state else { return None };
+        self.state = State::Failed;
+        let (name, how) = (self.role.name.clone(), "was not started again".into());
+        Some(LauncherError::Child { name, how, said: vec![why.to_owned()], code: exit::CHILD })
     }
 
     /// Asks it to end, or ends it; one that waits for its restart waits no more.
@@ -143,8 +181,8 @@ impl Process {
     }
 }
 
-fn spawn(role: &Role, output: ChildOutput) -> Result<State, LauncherError> {
-    let mut child = role.command()?.spawn().map_err(|e| LauncherError::io("start", &role.name, e))?;
+fn spawn(role: &Role, more: &[OsString], output: ChildOutput) -> Result<State, LauncherError> {
+    let mut child = role.command(more)?.spawn().map_err(|e| LauncherError::io("start", &role.name, e))?;
     let voice = Voice::listen(&role.name, (child.stdout.take(), child.stderr.take()), output);
     tracing::debug!(pid = child.id(), "{} started", role.name);
     Ok(State::Running { child, voice, since: Instant::now() })

@@ -1,5 +1,6 @@
 //! Turns what a process is for into the command that starts it.
 
+use super::sequence::Sequence;
 use crate::{error::LauncherError, owned::OWNED};
 use std::{
     ffi::OsString,
@@ -31,11 +32,13 @@ pub(crate) struct Role {
     pub(crate) plug_in: Option<PathBuf>,
     /// Its arguments, with the subcommand for this executable.
     pub(crate) arguments: Vec<OsString>,
+    /// Its pictures, if it can go on with those of an earlier process.
+    pub(crate) sequence: Option<Sequence>,
 }
 
 impl Role {
-    /// The command that starts it, with pipes for all that it says.
-    pub(super) fn command(&self) -> Result<Command, LauncherError> {
+    /// The command that starts it with `more` arguments than its own, and with pipes for all that it says.
+    pub(super) fn command(&self, more: &[OsString]) -> Result<Command, LauncherError> {
         let own = std::env::current_exe().map_err(|e| LauncherError::io("find", "this executable", e))?;
         let mut command = Command::new(own);
         if let Some(program) = &self.plug_in {
@@ -44,6 +47,7 @@ impl Role {
         }
         command
             .args(&self.arguments)
+            .args(more)
             .env(OWNED, "1")
             // A group of its own: Ctrl-C reaches the launcher alone, which then ends the others in order.
             .process_group(0)

@@ -67,7 +67,12 @@ impl Ground {
 
     /// The command, not started.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(PHOTONSTREAM);
+        self.command_of(Path::new(PHOTONSTREAM), arguments)
+    }
+
+    /// A copy of the command, not started.
+    pub(crate) fn command_of(&self, program: &Path, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program);
         command
             .args(arguments)
             .current_dir(self.path(""))

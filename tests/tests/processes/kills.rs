@@ -5,6 +5,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::{
     fs,
+    os::unix::fs::MetadataExt,
     path::Path,
     time::{Duration, Instant},
 };
@@ -35,19 +36,43 @@ fn a_killed_renderer_comes_back_and_pictures_continue() {
         "film",
     ]);
     let first = ground.process(" renderer cpu ", None);
-    let picture = ground.path("film/frame-0001.exr");
-    wait_for("a picture", || picture.exists().then_some(()));
+    let picture = |number: usize| ground.path(format!("film/frame-{number:04}.png"));
+    wait_for("pictures", || picture(2).exists().then_some(()));
+    // Those of the first process stay the files that they were, and the numbers go on without a gap.
+    let identity =
+        |number| fs::metadata(picture(number)).map(|m| (m.ino(), m.mtime(), m.mtime_nsec())).unwrap();
+    let made = files(&ground.path("film"), "png");
+    let before: Vec<_> = (1..=made).map(identity).collect();
     kill(first, Signal::KILL);
     let second = ground.process(" renderer cpu ", Some(first));
-    fs::remove_file(&picture).unwrap();
-    // The new process starts its numbers again.
-    wait_for("a picture of the new process", || picture.exists().then_some(()));
+    let newer = files(&ground.path("film"), "png") + 3;
+    wait_for("pictures of the new process", || picture(newer).exists().then_some(()));
+    assert_eq!((1..=made).map(identity).collect::<Vec<_>>(), before);
+    (1..=newer).for_each(|number| assert!(picture(number).exists(), "{number} of {newer}"));
     let renderers: Vec<_> =
         ground.processes().into_iter().filter(|(_, line)| line.contains(" renderer cpu ")).collect();
     assert!(matches!(renderers[..], [(pid, _)] if pid == second), "one alone, the same still: {renderers:?}");
     run.signal(Signal::TERM);
     let said = run.wait();
     said.expect(130, &["cpu was ended by signal 9 (SIGKILL)", "starting it again"]);
+    ground.wait_for_silence();
+}
+
+#[test]
+fn a_killed_renderer_makes_the_remaining_pictures_only() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let line = "--headless --frames 100 --sampling fresh --vsls 50 --size 8x8 --out film --json";
+    let arguments: Vec<_> = ["run", &scene].into_iter().chain(line.split(' ')).collect();
+    let run = ground.start(&arguments);
+    let renderer = ground.process(" renderer cpu ", None);
+    wait_for("a picture", || ground.path("film/frame-0001.png").exists().then_some(()));
+    kill(renderer, Signal::KILL);
+    let said = run.wait();
+    said.expect(0, &["cpu was ended by signal 9 (SIGKILL)"]);
+    let report: Value = serde_json::from_str(&said.stdout).unwrap();
+    assert_eq!(report["renderers"][0]["restarts"], 1, "{report}");
+    assert_eq!((files(&ground.path("film"), "exr"), files(&ground.path("film"), "png")), (100, 100));
     ground.wait_for_silence();
 }
 

@@ -3,6 +3,7 @@
 
 mod default_run;
 mod ending;
+mod giving_up;
 mod harness;
 mod kills;
 mod main_job;
