@@ -1,5 +1,5 @@
 //! Turns short TOML into scenes whose light is known in closed form.
-#![allow(dead_code)]
+#![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
 use photonstream_renderer_cpu::{LayerKind, RenderOptions, Vsl, VslSet};

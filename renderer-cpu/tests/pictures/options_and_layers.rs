@@ -1,15 +1,13 @@
 //! Turns options into pictures or clear refusals, and checks what the layers hold.
 #![allow(clippy::unwrap_used)]
 
-mod scenes;
-
+use crate::scenes::{NO_LIGHT, cornell, floor, options, scattered_vsls};
 use glam::Vec3;
 use photonstream_renderer_cpu::{
     LayerKind, ReferenceOptions, RenderError, RenderOptions, VslSet, Watch, reference, reference::Stop,
     render,
 };
 use photonstream_scene::RenderSettings;
-use scenes::{NO_LIGHT, cornell, floor, options, scattered_vsls};
 use std::sync::{
     Mutex,
     atomic::{AtomicBool, Ordering},
@@ -56,9 +54,9 @@ fn layers_hold_what_they_say() {
     for i in 0..film.pixel_count() {
         assert_eq!(layer(LayerKind::Albedo)[i], Vec3::new(0.8, 0.4, 0.2));
         assert!(layer(LayerKind::Normal)[i].distance(Vec3::new(0.5, 1.0, 0.5)) < 1e-6);
-        let distance = scene.camera.position.distance(scenes::on_floor(&scene, i, 21, 16));
+        let distance = scene.camera.position.distance(crate::scenes::on_floor(&scene, i, 21, 16));
         assert!((layer(LayerKind::Depth)[i].x - distance).abs() < 1e-5);
-        let x = scenes::on_floor(&scene, i, 21, 16);
+        let x = crate::scenes::on_floor(&scene, i, 21, 16);
         let owner = (0..vsls.len())
             .map(|k| vsls.get(k).unwrap())
             .min_by(|a, b| a.position.distance(x).total_cmp(&b.position.distance(x)))

@@ -1,15 +1,13 @@
 //! Turns single virtual surface lights into pictures and compares them with the sum done by hand.
 #![allow(clippy::unwrap_used)]
 
-mod scenes;
-
+use crate::scenes::{NO_LIGHT, cornell, floor, on_floor, options, scattered_vsls};
 use glam::Vec3;
 use photonstream_renderer_cpu::{
     InstructionSet, LayerKind, RenderOptions, Vsl, VslSet, Watch, render, render_with,
 };
 use photonstream_scene::Visibility;
 use photonstream_shading::Kernel;
-use scenes::{NO_LIGHT, cornell, floor, on_floor, options, scattered_vsls};
 use std::f64::consts::PI;
 
 const LAMP: Vsl = Vsl {
@@ -192,8 +190,8 @@ fn samples_soften_edges_and_keep_the_mean() {
     assert_eq!(many.stats.camera_rays, 16 * 80 * 60);
     for layer in ["full", "albedo"] {
         let (a, b) = (
-            scenes::mean(&one.layer(layer).unwrap().pixels),
-            scenes::mean(&many.film.layer(layer).unwrap().pixels),
+            crate::scenes::mean(&one.layer(layer).unwrap().pixels),
+            crate::scenes::mean(&many.film.layer(layer).unwrap().pixels),
         );
         assert!((a / b - 1.0).abs() < 0.02, "{layer}: {a} against {b}");
     }

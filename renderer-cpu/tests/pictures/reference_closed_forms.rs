@@ -1,8 +1,7 @@
 //! Turns scenes of known light into reference pictures and compares the two.
 #![allow(clippy::unwrap_used)]
 
-mod scenes;
-
+use crate::scenes::{floor, mean, options, scene, sphere};
 use glam::Vec3;
 use photonstream_renderer_cpu::{
     LayerKind, Reference, ReferenceOptions, Watch, reference,
@@ -11,7 +10,6 @@ use photonstream_renderer_cpu::{
 };
 use photonstream_scene::{RenderSettings, Scene};
 use photonstream_shading::{Camera, surface};
-use scenes::{floor, mean, options, scene, sphere};
 use std::f64::consts::PI;
 
 const ALL: [LayerKind; 3] = [LayerKind::Full, LayerKind::Direct, LayerKind::Indirect];
@@ -176,7 +174,7 @@ fn a_point_light_follows_the_cosine_law() {
     .unwrap()
     .film;
     for (i, p) in film.layer("full").unwrap().pixels.iter().enumerate() {
-        let d = lamp - scenes::on_floor(&scene, i, 40, 30).as_dvec3();
+        let d = lamp - crate::scenes::on_floor(&scene, i, 40, 30).as_dvec3();
         let irradiance = d.y / d.length().powi(3) / (4.0 * PI);
         for (found, expected) in [
             (p.x, 4.0 * 0.8 / PI * irradiance),

@@ -1,13 +1,11 @@
 //! Photon streaming against closed forms: energy in closed scenes, and the uniform light in a sphere.
 #![allow(clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::{closed_box, closed_sphere, filled};
 use glam::Vec3;
 use photonstream_scene::Scene;
 use photonstream_shading::{Kernel, surface};
 use photonstream_simulator::{flux::QUANTUM, ledger::Ledger, simulation::Simulation};
-use support::{closed_box, closed_sphere, filled};
 
 const POWER: f32 = 40.0;
 const STREAMING: &str = "vsls = 300\npool_paths = 65536\nseed = 5";
@@ -104,7 +102,7 @@ fn light_in_a_sphere_is_uniform_wherever_the_light_stands() {
 /// Light passes from room to room through no wall: every VSL that faces the dark room holds exactly nothing.
 #[test]
 fn the_dark_room_is_exactly_dark() {
-    let scene = support::config("two-rooms.toml", |c| c.streaming.pool_paths = Some(1 << 16));
+    let scene = crate::support::config("two-rooms.toml", |c| c.streaming.pool_paths = Some(1 << 16));
     let (simulation, ledger) = filled(scene);
     let (mut dark, mut lit) = (0, 0.0);
     for (vsl, reading) in simulation.placement.vsls.iter().zip(ledger.readings(&simulation.scene)) {
@@ -124,7 +122,7 @@ fn the_dark_room_is_exactly_dark() {
 /// Without light, or with nothing to hit, nothing is traced, and nothing fails.
 #[test]
 fn nothing_to_do_is_done_at_once() {
-    let dark = support::scene(
+    let dark = crate::support::scene(
         "[material.a]\nalbedo = 0.5\n[object.a]\nmaterial = \"a\"\nbox = { size_m = [1, 1, 1] }",
     );
     let (simulation, ledger) = filled(dark);
@@ -139,7 +137,7 @@ fn no_power_is_exactly_no_flux() {
         let lights: String = (0..3)
             .map(|i| format!("[light.l{i}]\npower_w = 0\npoint = {{ position_m = [0.{i}, 0, 0.1] }}\n"))
             .collect();
-        let (simulation, ledger) = filled(support::scene(&format!(
+        let (simulation, ledger) = filled(crate::support::scene(&format!(
             "[material.a]\nalbedo = 0.5\n[object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [2, 2, 2] }}\n\
              {lights}[streaming]\nvsls = 50\npool_paths = 3000\nlight_columns = {columns}\n"
         )));

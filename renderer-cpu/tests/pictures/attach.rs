@@ -2,8 +2,6 @@
 //! when the channel closes.
 #![allow(clippy::unwrap_used)]
 
-mod scenes;
-
 use photonstream_film::Film;
 use photonstream_protocol::{
     ChannelName, FrameSource, LightRecord, ObjectRecord, Publisher, Runtime, SegmentSpec, StatisticsRecord,
@@ -25,7 +23,7 @@ struct Simulator {
 
 impl Simulator {
     fn start(root: &Path) -> Self {
-        let scene = scenes::sphere([0.0; 3]);
+        let scene = crate::scenes::sphere([0.0; 3]);
         let spec = SegmentSpec {
             vsl_capacity: 64,
             object_capacity: 4,
@@ -154,7 +152,7 @@ fn pictures_follow_the_frames() {
     simulator.publish(20.0, false);
     wait_for(&out.join("frame-0002.png"));
     let full = |n: u32| {
-        scenes::mean(
+        crate::scenes::mean(
             &Film::read_exr(&out.join(format!("frame-000{n}.exr"))).unwrap().layer("full").unwrap().pixels,
         )
     };
@@ -238,7 +236,7 @@ fn a_killed_simulator_is_waited_for_and_its_successor_followed() {
     let out = pictures.path().join("out");
     let simulate = |power: &str| {
         Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "simulator_child"])
+            .args(["--exact", "attach::simulator_child"])
             .env(CHILD, root.path())
             .env("PHOTONSTREAM_TEST_POWER", power)
             .stdout(Stdio::null())
@@ -265,7 +263,7 @@ fn a_killed_simulator_is_waited_for_and_its_successor_followed() {
     );
     let mean = |n: u32| {
         let film = Film::read_exr(&out.join(format!("frame-000{n}.exr"))).unwrap();
-        scenes::mean(&film.layers()[0].pixels)
+        crate::scenes::mean(&film.layers()[0].pixels)
     };
     assert!((mean(2) / mean(1) - 3.0).abs() < 1e-5, "{} after {}", mean(2), mean(1));
     // What the killed simulator left in shared memory.

@@ -1,8 +1,6 @@
 //! The pool's flux is exact: equal to a rebuild bit for bit, on any number of threads, and zero when light is gone.
 #![allow(clippy::unwrap_used)]
 
-mod support;
-
 use photonstream_simulator::{
     flux::{Deposit, VslFlux},
     pool::PathPool,
@@ -78,7 +76,7 @@ fn a_sweep_over_five_decades_leaves_nothing_behind() {
 #[test]
 fn any_number_of_threads_gives_identical_flux() {
     for sampling in ["replay", "fresh"] {
-        let scene = Arc::new(support::scene(&format!(
+        let scene = Arc::new(crate::support::scene(&format!(
             "[material.a]\nalbedo = [0.8, 0.5, 0.2]\n\
              [object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [2, 2, 2] }}\n\
              [object.ball]\nmaterial = \"a\"\nsphere = {{ radius_m = 0.4, segments = 24 }}\n\
@@ -116,7 +114,7 @@ fn shared_columns_agree_with_columns_of_their_own() {
                 )
             })
             .collect();
-        support::filled(support::scene(&format!(
+        crate::support::filled(crate::support::scene(&format!(
             "[material.a]\nalbedo = 0.5\n[object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [2, 2, 2] }}\n\
              {lights}[streaming]\nvsls = 50\npool_paths = 20000\nlight_columns = {columns}\n"
         )))

@@ -1,5 +1,5 @@
 //! Turns a few lines of TOML into scenes for tests.
-#![allow(dead_code)] // Each test binary uses its own part.
+#![allow(clippy::unwrap_used)]
 
 use photonstream_scene::{Scene, SceneConfig};
 use photonstream_simulator::{ledger::Ledger, simulation::Simulation};

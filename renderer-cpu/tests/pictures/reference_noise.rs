@@ -1,12 +1,10 @@
 //! Turns pairs of reference pictures into a check of the noise that they state of themselves.
 #![allow(clippy::unwrap_used)]
 
-mod scenes;
-
+use crate::scenes::cornell;
 use photonstream_evaluation::compare;
 use photonstream_renderer_cpu::{LayerKind, Reference, ReferenceOptions, Watch, reference, reference::Stop};
 use photonstream_scene::RenderSettings;
-use scenes::cornell;
 
 fn trace(seed: u64, stop: Stop, threads: Option<usize>) -> Reference {
     let defaults = ReferenceOptions::from_settings(&RenderSettings::default(), stop);

@@ -1,8 +1,6 @@
 //! The service as a whole: actors, shared memory and control socket within one process.
 #![allow(clippy::unwrap_used)]
 
-mod support;
-
 use photonstream_protocol::{
     AccessMode, ChannelName, ControlClient, Liveness, Reading, Reply, Request, Subscriber, VslFrame,
 };
@@ -65,7 +63,7 @@ fn after(subscriber: &mut Subscriber, paths: u64) -> VslFrame {
 fn room(sampling: &str) -> Simulation {
     let streaming =
         format!("vsls = 300\npool_paths = 30000\nsampling = \"{sampling}\"\npublish_period_ms = 1");
-    Simulation::new(Arc::new(support::closed_box(0.7, 10.0, &streaming)))
+    Simulation::new(Arc::new(crate::support::closed_box(0.7, 10.0, &streaming)))
 }
 
 /// Published flux is that of the pool traced in this process, bit for bit, with 1 and 3 tracers, replayed and fresh.
@@ -153,7 +151,7 @@ fn a_converged_scene_rests() {
 #[test]
 fn a_panic_ends_the_service() {
     let small = room("replay");
-    let large = Simulation::new(Arc::new(support::closed_sphere(0.5, 1.0, 0.0, "vsls = 100")));
+    let large = Simulation::new(Arc::new(crate::support::closed_sphere(0.5, 1.0, 0.0, "vsls = 100")));
     let tracer =
         Tracer::new(Arc::clone(&large.scene), Arc::clone(&small.owners), Arc::clone(&large.emitters));
     let broken = Simulation { tracer, ..large };

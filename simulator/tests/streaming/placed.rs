@@ -1,8 +1,6 @@
 //! Placement and owners: areas, distances, moving objects, and every owner the nearest.
 #![allow(clippy::unwrap_used)]
 
-mod support;
-
 use glam::Vec3;
 use photonstream_scene::{Scene, Side};
 use photonstream_shading::{sampling, sobol::Sequence, surface};
@@ -15,7 +13,7 @@ use photonstream_simulator::{
 use std::sync::Arc;
 
 fn objects(transform: &str) -> Scene {
-    support::scene(&format!(
+    crate::support::scene(&format!(
         "[material.a]\nalbedo = 0.5\n\
          [object.ball]\nmaterial = \"a\"\n{transform}\nsphere = {{ radius_m = 0.5, segments = 24 }}\n\
          [object.crate]\nmaterial = \"a\"\nposition_m = [2, 0, 0]\nbox = {{ size_m = [1, 0.5, 2] }}\n\
