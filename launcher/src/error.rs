@@ -4,7 +4,7 @@ use crate::exit;
 use photonstream_evaluation::MetricsError;
 use photonstream_film::FilmError;
 use photonstream_protocol::ProtocolError;
-use photonstream_renderer_cpu::RenderError;
+use photonstream_renderer::RenderError;
 use photonstream_scene::SceneError;
 use photonstream_simulator::error::SimulatorError;
 use std::{io, path::PathBuf};

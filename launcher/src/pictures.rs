@@ -3,9 +3,10 @@
 use crate::{error::LauncherError, progress::Share};
 use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
-use photonstream_renderer_cpu::{
-    LayerKind, RenderOptions, RenderStats, VslSet, Watch, cli::Size, published::PublishedScene, render,
+use photonstream_renderer::{
+    LayerKind, RenderOptions, RenderStats, VslSet, Watch, cli::Size, published::PublishedScene,
 };
+use photonstream_renderer_cpu::render;
 use photonstream_scene::{RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 use std::{

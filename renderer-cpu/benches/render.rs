@@ -2,7 +2,8 @@
 
 use divan::Bencher;
 use glam::Vec3;
-use photonstream_renderer_cpu::{InstructionSet, LayerKind, RenderOptions, Vsl, VslSet, Watch, render_with};
+use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet, Watch};
+use photonstream_renderer_cpu::{InstructionSet, render_with};
 use photonstream_scene::{Scene, Visibility};
 use photonstream_shading::{sampling, sobol::Sequence, surface};
 use std::path::Path;

@@ -1,8 +1,9 @@
 //! Turns all virtual surface lights into the few that can light a tile, packed for the gathering loop.
 
-use crate::{VslSet, tile::Tile};
+use crate::tile::Tile;
 use core::f32::consts::PI;
 use glam::Vec3;
+use photonstream_renderer::VslSet;
 use photonstream_shading::kernel::{Kernel, range_sq};
 
 /// A virtual surface light as the gathering loop reads it.
@@ -55,7 +56,7 @@ impl Culling {
         }
         let on_plane = 4.0 * f32::EPSILON * self.magnitude;
         for index in 0..vsls.len() {
-            let (position, normal, flux) = (vsls.position[index], vsls.normal[index], vsls.flux[index]);
+            let (position, normal, flux) = (vsls.position()[index], vsls.normal()[index], vsls.flux()[index]);
             let flux_max = flux.max_element();
             let (lo, hi) = (tile.lo - position, tile.hi - position);
             let highest = (normal * lo).max(normal * hi).element_sum();
@@ -73,7 +74,7 @@ impl Culling {
                 position,
                 inverse_normal: -normal,
                 flux,
-                area_term: self.kernel.area_term(vsls.area[index]),
+                area_term: self.kernel.area_term(vsls.area()[index]),
                 range_sq,
                 bound,
             };

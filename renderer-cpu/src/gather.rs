@@ -128,8 +128,9 @@ fn add_block<S: Simd, const RANGED: bool>(simd: S, lights: &[Emitter], tile: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Vsl, VslSet, cull::Culling, surface::Surface, tile::TILE_SAMPLES};
+    use crate::{cull::Culling, surface::Surface, tile::TILE_SAMPLES};
     use glam::Vec3;
+    use photonstream_renderer::{Vsl, VslSet};
     use photonstream_shading::{Kernel, sampling, sobol::Sequence};
 
     /// Random pixels and lights, some of them coincident: every instruction set gives bit for bit the f32 sum of
@@ -174,8 +175,8 @@ mod tests {
                 for (i, &(x, n)) in points[..1000].iter().enumerate() {
                     let mut expected = Vec3::ZERO;
                     for k in 0..vsls.len() {
-                        let d = vsls.position[k] - x;
-                        expected += vsls.flux[k] * kernel.transfer(d, n, vsls.normal[k], vsls.area[k]);
+                        let d = vsls.position()[k] - x;
+                        expected += vsls.flux()[k] * kernel.transfer(d, n, vsls.normal()[k], vsls.area()[k]);
                     }
                     let expected = if i % 10 == 7 { Vec3::ZERO } else { expected };
                     assert_eq!(tile.irradiance.get(i), expected, "{kernel}, {set:?}, pixel {i}");

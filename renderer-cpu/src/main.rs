@@ -5,7 +5,8 @@
 #![forbid(unsafe_code)]
 
 use clap::Parser;
-use photonstream_renderer_cpu::{attach, cli::Args};
+use photonstream_renderer::{attach, cli::Args};
+use photonstream_renderer_cpu::CpuRenderer;
 use std::{
     io::Write,
     sync::{Arc, atomic::AtomicBool},
@@ -26,7 +27,7 @@ fn main() -> anyhow::Result<()> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&cancelled))?;
     }
-    let report = attach::run(&args, &cancelled, &mut |picture| {
+    let report = attach::run(&args, &mut CpuRenderer, &cancelled, &mut |picture| {
         tracing::info!("frame {} in {:.0} ms", picture.frame, picture.stats.render_ms);
         for file in picture.files {
             // A reader of stdout that has gone away does not stop the pictures.

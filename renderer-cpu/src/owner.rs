@@ -1,7 +1,7 @@
 //! Turns a point on a surface into the virtual surface light that owns it, for pictures of who owns what.
 
-use crate::{VslSet, surface::Surface};
-use glam::Vec3;
+use crate::surface::Surface;
+use photonstream_renderer::{VslSet, owner::COMPATIBLE_COS};
 
 /// The virtual surface lights of each object.
 pub(crate) struct Owners<'a> {
@@ -10,13 +10,10 @@ pub(crate) struct Owners<'a> {
     of_object: Vec<Vec<u32>>,
 }
 
-/// Smallest cosine between the normals of a point and of its owner.
-const COMPATIBLE_COS: f32 = 0.5;
-
 impl<'a> Owners<'a> {
     pub(crate) fn new(vsls: &'a VslSet, objects: usize) -> Self {
         let mut of_object = vec![Vec::new(); objects];
-        for (index, &object) in vsls.object.iter().enumerate() {
+        for (index, &object) in vsls.object().iter().enumerate() {
             if let Some(list) = of_object.get_mut(object as usize) {
                 list.push(index as u32);
             }
@@ -31,11 +28,11 @@ impl<'a> Owners<'a> {
         let mut best_of_side = (f32::INFINITY, None);
         for &index in &self.of_object[surface.object as usize] {
             let index = index as usize;
-            let cos = self.vsls.normal[index].dot(surface.normal);
+            let cos = self.vsls.normal()[index].dot(surface.normal);
             if cos <= 0.0 {
                 continue;
             }
-            let distance_sq = self.vsls.position[index].distance_squared(surface.position);
+            let distance_sq = self.vsls.position()[index].distance_squared(surface.position);
             if distance_sq < best_of_side.0 {
                 best_of_side = (distance_sq, Some(index));
             }
@@ -47,25 +44,11 @@ impl<'a> Owners<'a> {
     }
 }
 
-/// A colour for each index that neighbours do not share: a hue far from that of the indices around it.
-pub(crate) fn colour(index: usize) -> Vec3 {
-    // Golden-ratio steps spread any run of hues, and two more of other irrationals the brightness and saturation.
-    let part = |step: f64| ((index as f64 + 0.5) * step).fract() as f32;
-    let hue = part(0.618_033_988_749_895);
-    let value = 0.5 + 0.5 * part(0.754_877_666_246_693);
-    let saturation = 0.45 + 0.5 * part(0.569_840_290_998_053);
-    let channel = |offset: f32| {
-        let x = (hue + offset).fract() * 6.0;
-        let ramp = ((x - 3.0).abs() - 1.0).clamp(0.0, 1.0);
-        value * (1.0 - saturation + saturation * ramp)
-    };
-    Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Vsl;
+    use glam::Vec3;
+    use photonstream_renderer::Vsl;
 
     fn surface(position: Vec3, normal: Vec3, object: u32) -> Surface {
         Surface {
@@ -102,15 +85,5 @@ mod tests {
         assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::NEG_Y, 2)), None);
         // No compatible normal (cosines 0.4, 0.17 and below 0): the nearest of the side.
         assert_eq!(owners.find(&surface(Vec3::ZERO, Vec3::new(0.3, -0.4, 0.75f32.sqrt()), 0)), Some(1));
-    }
-
-    #[test]
-    fn colours_are_valid_and_distinct() {
-        let colours: Vec<_> = (0..1000).map(colour).collect();
-        for (i, a) in colours.iter().enumerate() {
-            assert!(a.min_element() >= 0.0 && a.max_element() <= 1.0);
-            // Neighbouring indices are told apart at a glance.
-            assert!(colours[..i].iter().rev().take(4).all(|b| a.distance(*b) > 0.1), "{i}");
-        }
     }
 }

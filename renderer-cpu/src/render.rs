@@ -1,59 +1,26 @@
 //! Turns a scene and its virtual surface lights into a picture: the sum of METHODS §2, tile by tile.
 
 use crate::{
-    InstructionSet, LayerKind, RenderError, RenderOptions, VslSet, Watch,
+    InstructionSet,
     cull::{Culling, Selection},
     direct, gather,
-    owner::{self, Owners},
+    owner::Owners,
     shadowed,
     surface::{self, Surface},
+    threads::on_threads,
     tile::{TILE_EDGE, Tile},
-    watch::on_threads,
 };
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use photonstream_film::Film;
+use photonstream_protocol::VslFrame;
+use photonstream_renderer::{
+    FrameRenderer, LayerKind, RenderError, RenderOptions, RenderStats, Rendered, VslSet, Watch, owner,
+};
 use photonstream_scene::{Scene, Visibility};
 use photonstream_shading::sobol::Sequence;
 use rayon::prelude::*;
-use serde::Serialize;
 use std::{sync::atomic::AtomicUsize, time::Instant};
-
-/// A picture and what it took.
-#[derive(Clone, Debug)]
-pub struct Rendered {
-    /// The layers asked for, and where they come from.
-    pub film: Film,
-    /// What it took.
-    pub stats: RenderStats,
-}
-
-/// What a picture took. The keys of the serialised form are the fields' names.
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
-pub struct RenderStats {
-    /// Time from call to picture.
-    pub render_ms: f64,
-    /// Rays from the camera.
-    pub camera_rays: u64,
-    /// Shadow rays to lights.
-    pub light_rays: u64,
-    /// Shadow rays to virtual surface lights.
-    pub vsl_rays: u64,
-    /// Number of virtual surface lights.
-    pub vsls: u64,
-    /// What the range of the lights may have lost at most, as a share of the indirect light of the picture: the sum
-    /// of the upper bounds of all that was skipped over the sum of what was found. 0 where nothing was skipped.
-    pub range_loss_share: f64,
-}
-
-impl RenderStats {
-    fn merge(mut self, other: &Self) -> Self {
-        self.camera_rays += other.camera_rays;
-        self.light_rays += other.light_rays;
-        self.vsl_rays += other.vsl_rays;
-        self
-    }
-}
 
 /// Renders `scene` as lit by its lights and by `vsls`.
 ///
@@ -84,6 +51,10 @@ pub fn render_with(
 ) -> Result<Rendered, RenderError> {
     let start = Instant::now();
     options.validate()?;
+    if options.visibility == Visibility::Ao {
+        let expected = "none or rays here; ao needs the G-buffer of --renderer wgpu";
+        return Err(RenderError::Option { option: "visibility", found: "ao".into(), expected });
+    }
     let mut film = Film::new(options.width, options.height)?;
     let frame = Frame::new(scene, vsls, options, instructions);
     let tiles = on_threads(options.threads, || frame.tiles(watch))?;
@@ -103,20 +74,29 @@ pub fn render_with(
         tiles.iter().fold((0.0, 0.0), |(s, i), tile| (s + tile.skipped, i + tile.indirect));
     stats.range_loss_share = if indirect > 0.0 { skipped / indirect } else { 0.0 };
     stats.vsls = vsls.len() as u64;
-    let metadata = &mut film.metadata;
-    metadata.scene_name = Some(scene.name.clone());
-    metadata.scene_hash = Some(scene.hash);
-    metadata.method = Some("photon-streaming".into());
-    metadata.kernel = Some(options.kernel.name().into());
-    metadata.visibility = Some(options.visibility.name().into());
-    metadata.samples_per_pixel = Some(options.samples_per_pixel.into());
-    metadata.vsls = Some(stats.vsls);
-    metadata.software = Some(SOFTWARE.into());
     stats.render_ms = start.elapsed().as_secs_f64() * 1e3;
-    Ok(Rendered { film, stats })
+    let mut rendered = Rendered { film, stats };
+    rendered.describe(scene, None, options);
+    Ok(rendered)
 }
 
-pub(crate) const SOFTWARE: &str = concat!("photonstream ", env!("CARGO_PKG_VERSION"));
+/// The CPU as a renderer of published frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuRenderer;
+
+impl FrameRenderer for CpuRenderer {
+    fn render(
+        &mut self,
+        scene: &Scene,
+        frame: &VslFrame,
+        options: &RenderOptions,
+        watch: Watch<'_>,
+    ) -> Result<Rendered, RenderError> {
+        let mut rendered = render(scene, &VslSet::from_records(&frame.vsls)?, options, watch)?;
+        rendered.describe(scene, Some(frame), options);
+        Ok(rendered)
+    }
+}
 
 /// All that the tiles of one picture share.
 struct Frame<'a> {
@@ -229,7 +209,9 @@ impl<'a> Frame<'a> {
         self.culling.select(self.vsls, tile, selection);
         result.skipped += selection.skipped;
         match self.options.visibility {
-            Visibility::None => result.skipped += gather::accumulate(self.instructions, selection, tile),
+            Visibility::None | Visibility::Ao => {
+                result.skipped += gather::accumulate(self.instructions, selection, tile)
+            }
             Visibility::Rays => {
                 let shadowed = shadowed::accumulate(self.scene, &self.culling, selection, tile);
                 result.skipped += shadowed.skipped;
@@ -269,7 +251,7 @@ impl<'a> Frame<'a> {
                 LayerKind::Albedo => surface.albedo,
                 LayerKind::Normal => (surface.normal + Vec3::ONE) * 0.5,
                 LayerKind::Vsl => owner.map_or(Vec3::ZERO, owner::colour),
-                LayerKind::Flux => owner.map_or(Vec3::ZERO, |o| radiosity(self.vsls, o)),
+                LayerKind::Flux => owner.map_or(Vec3::ZERO, |o| self.vsls.radiosity(o)),
                 LayerKind::Depth => Vec3::splat(surface.distance),
             };
         }
@@ -278,9 +260,3 @@ impl<'a> Frame<'a> {
 
 /// Scrambles area-light samples apart from pixel samples.
 const LIGHT_SEED: u64 = 0x6C69_6768_7473_0000;
-
-/// Flux over area in W m⁻²; zero for a light without area.
-fn radiosity(vsls: &VslSet, index: usize) -> Vec3 {
-    let area = vsls.area[index];
-    if area > 0.0 { vsls.flux[index] / area } else { Vec3::ZERO }
-}

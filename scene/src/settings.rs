@@ -18,6 +18,9 @@ pub enum Sampling {
 pub enum Visibility {
     /// V = 1: paper A.
     None,
+    /// V = 1, and screen-space ambient occlusion over the sum: the shadows near contacts, without a ray. Paper A names
+    /// it as what to do without shadows of virtual surface lights. Only renderers with a G-buffer have it.
+    Ao,
     /// A shadow ray to every virtual surface light.
     #[default]
     Rays,
@@ -130,4 +133,4 @@ macro_rules! named {
 
 named!(Sides, "sides", Front = "front", Back = "back", Both = "both");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
-named!(Visibility, "visibility", None = "none", Rays = "rays");
+named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays");

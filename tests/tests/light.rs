@@ -2,9 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use photonstream_evaluation::compare;
-use photonstream_renderer_cpu::{
-    LayerKind, ReferenceOptions, RenderOptions, Rendered, VslSet, Watch, reference, reference::Stop, render,
-};
+use photonstream_renderer::{LayerKind, RenderOptions, Rendered, VslSet, Watch};
+use photonstream_renderer_cpu::{ReferenceOptions, reference, reference::Stop, render};
 use photonstream_scene::{Scene, SceneConfig, Visibility};
 use photonstream_shading::Kernel;
 use photonstream_simulator::{counters::Counters, records, simulation::Simulation};

@@ -2,7 +2,7 @@
 
 use super::render::{self, Simulated};
 use crate::{cli::Global, error::LauncherError, output, pictures::Look};
-use photonstream_renderer_cpu::LayerKind;
+use photonstream_renderer::LayerKind;
 use photonstream_simulator::cli::Overrides;
 use std::{
     path::{Path, PathBuf},

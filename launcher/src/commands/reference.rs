@@ -8,10 +8,9 @@ use crate::{
     progress::Share,
     signals::Listener,
 };
+use photonstream_renderer::{LayerKind, Watch, cli::Size};
 use photonstream_renderer_cpu::{
-    LayerKind, ReferenceOptions, Watch,
-    cli::Size,
-    reference,
+    ReferenceOptions, reference,
     reference::{ReferenceStats, Stop},
 };
 use photonstream_scene::SceneConfig;

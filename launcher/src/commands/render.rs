@@ -10,7 +10,7 @@ use crate::{
     supervise::{BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Supervisor},
 };
 use photonstream_protocol::{ChannelName, ProtocolError, VslFrame};
-use photonstream_renderer_cpu::LayerKind;
+use photonstream_renderer::LayerKind;
 use photonstream_scene::SceneConfig;
 use photonstream_simulator::cli::Overrides;
 use serde::Serialize;

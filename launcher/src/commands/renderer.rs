@@ -1,10 +1,11 @@
 //! Turns this process into a renderer that `run` has started.
 
 use crate::{cli::Global, error::LauncherError, owned, signals::Listener};
-use photonstream_renderer_cpu::{
+use photonstream_renderer::{
     attach::{self, Ended},
     cli,
 };
+use photonstream_renderer_cpu::CpuRenderer;
 use std::ffi::OsString;
 
 /// Arguments of the hidden `photonstream renderer`.
@@ -36,7 +37,7 @@ pub(crate) fn run(args: &Args, _: &Global) -> Result<(), LauncherError> {
     owned::end_with_launcher();
     let BuiltIn::Cpu(args) = &args.renderer;
     let cancelled = Listener::flag_only()?;
-    let report = attach::run(args, &cancelled, &mut |picture| {
+    let report = attach::run(args, &mut CpuRenderer, &cancelled, &mut |picture| {
         let files: Vec<_> = picture.files.iter().map(|file| file.display().to_string()).collect();
         let ms = picture.stats.render_ms;
         tracing::info!("frame {} in {ms:.0} ms: {}", picture.frame, files.join(", "));

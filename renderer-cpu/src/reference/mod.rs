@@ -13,8 +13,9 @@ mod sums;
 
 pub use options::{PixelFilter, ReferenceOptions, Stop};
 
-use crate::{LayerKind, RenderError, Watch, render::SOFTWARE, watch::on_threads};
+use crate::threads::on_threads;
 use photonstream_film::Film;
+use photonstream_renderer::{LayerKind, RenderError, SOFTWARE, Watch};
 use photonstream_scene::Scene;
 use serde::Serialize;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! Gathers what a reference picture shall be like.
 
-use crate::{LayerKind, RenderError};
+use photonstream_renderer::{LayerKind, RenderError};
 use photonstream_scene::RenderSettings;
 use std::time::Duration;
 

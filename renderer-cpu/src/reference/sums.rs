@@ -6,11 +6,9 @@ use super::{
     options::PixelFilter,
     path::{self, PathRadiance},
 };
-use crate::{
-    LayerKind, RenderError, Watch,
-    surface::{self, Surface},
-};
+use crate::surface::{self, Surface};
 use glam::{DVec3, Vec3};
+use photonstream_renderer::{LayerKind, RenderError, Watch};
 use photonstream_scene::Scene;
 use photonstream_shading::sobol::Sequence;
 use rayon::prelude::*;

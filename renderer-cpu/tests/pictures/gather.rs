@@ -3,9 +3,8 @@
 
 use crate::scenes::{NO_LIGHT, cornell, floor, on_floor, options, scattered_vsls};
 use glam::Vec3;
-use photonstream_renderer_cpu::{
-    InstructionSet, LayerKind, RenderOptions, Vsl, VslSet, Watch, render, render_with,
-};
+use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet, Watch};
+use photonstream_renderer_cpu::{InstructionSet, render, render_with};
 use photonstream_scene::Visibility;
 use photonstream_shading::Kernel;
 use std::f64::consts::PI;

@@ -3,10 +3,8 @@
 
 use crate::scenes::{NO_LIGHT, cornell, floor, options, scattered_vsls};
 use glam::Vec3;
-use photonstream_renderer_cpu::{
-    LayerKind, ReferenceOptions, RenderError, RenderOptions, VslSet, Watch, reference, reference::Stop,
-    render,
-};
+use photonstream_renderer::{LayerKind, RenderError, RenderOptions, VslSet, Watch};
+use photonstream_renderer_cpu::{ReferenceOptions, reference, reference::Stop, render};
 use photonstream_scene::RenderSettings;
 use std::sync::{
     Mutex,

@@ -3,8 +3,9 @@
 
 use crate::scenes::{floor, mean, options, scene, sphere};
 use glam::Vec3;
+use photonstream_renderer::{LayerKind, Watch};
 use photonstream_renderer_cpu::{
-    LayerKind, Reference, ReferenceOptions, Watch, reference,
+    Reference, ReferenceOptions, reference,
     reference::{PixelFilter, Stop},
     render,
 };
@@ -128,8 +129,7 @@ fn unit_squares_have_their_form_factors() {
         // The renderer's own direct light: the same.
         let mut settings = options(24, 24, &[LayerKind::Direct]);
         settings.light_samples = 4096;
-        let picture =
-            render(&scene, &photonstream_renderer_cpu::VslSet::default(), &settings, Watch::default());
+        let picture = render(&scene, &photonstream_renderer::VslSet::default(), &settings, Watch::default());
         let film = picture.unwrap().film;
         let red: f64 = film.layers()[0].pixels.iter().map(|p| f64::from(p.x)).sum::<f64>();
         let found = red / 576.0 * PI / 0.8 / 3.0;
@@ -167,7 +167,7 @@ fn a_point_light_follows_the_cosine_law() {
     let lamp = Vec3::new(0.3, 0.8, -0.2).as_dvec3();
     let film = render(
         &scene,
-        &photonstream_renderer_cpu::VslSet::default(),
+        &photonstream_renderer::VslSet::default(),
         &options(40, 30, &[LayerKind::Full, LayerKind::Direct, LayerKind::Indirect]),
         Watch::default(),
     )

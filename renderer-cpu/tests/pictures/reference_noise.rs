@@ -3,7 +3,8 @@
 
 use crate::scenes::cornell;
 use photonstream_evaluation::compare;
-use photonstream_renderer_cpu::{LayerKind, Reference, ReferenceOptions, Watch, reference, reference::Stop};
+use photonstream_renderer::{LayerKind, Watch};
+use photonstream_renderer_cpu::{Reference, ReferenceOptions, reference, reference::Stop};
 use photonstream_scene::RenderSettings;
 
 fn trace(seed: u64, stop: Stop, threads: Option<usize>) -> Reference {

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
-use photonstream_renderer_cpu::{LayerKind, RenderOptions, Vsl, VslSet};
+use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet};
 use photonstream_scene::{RenderSettings, Scene, SceneConfig, Visibility};
 use photonstream_shading::{Camera, Kernel, sobol::Sequence, surface};
 use std::path::Path;

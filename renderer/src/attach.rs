@@ -1,8 +1,6 @@
 //! Turns the frames of a channel into picture files: the renderer process.
 
-use crate::{
-    RenderError, RenderStats, Rendered, VslSet, Watch, cli::Args, published::PublishedScene, render,
-};
+use crate::{FrameRenderer, RenderError, RenderStats, Rendered, Watch, cli::Args, published::PublishedScene};
 use photonstream_film::Film;
 use photonstream_protocol::{AccessMode, Liveness, ProtocolError, Reading, Subscriber, VslFrame};
 use photonstream_scene::RenderSettings;
@@ -58,11 +56,13 @@ pub struct Written<'a> {
 /// that is insecure or of another release.
 pub fn run(
     args: &Args,
+    renderer: &mut dyn FrameRenderer,
     cancelled: &AtomicBool,
     written: &mut dyn FnMut(&Written<'_>),
 ) -> Result<Report, RenderError> {
     let stop = || cancelled.load(Ordering::Relaxed);
-    let mut run = Run { args, cancelled, written, scene: PublishedScene::default(), pictures: 0, last: None };
+    let mut run =
+        Run { args, renderer, cancelled, written, scene: PublishedScene::default(), pictures: 0, last: None };
     let Some(mut subscriber) = attach(args, &stop)? else { return Ok(run.report(Ended::Cancelled)) };
     let mut told = None;
     let mut pending = false;
@@ -148,6 +148,7 @@ fn tell_liveness(told: &mut Option<String>, args: &Args, liveness: &Liveness) {
 
 struct Run<'a> {
     args: &'a Args,
+    renderer: &'a mut dyn FrameRenderer,
     cancelled: &'a AtomicBool,
     written: &'a mut dyn FnMut(&Written<'_>),
     scene: PublishedScene,
@@ -169,12 +170,8 @@ impl Run<'_> {
 
     fn picture(&mut self, frame: &VslFrame) -> Result<(), RenderError> {
         let scene = self.scene.update(frame)?;
-        let vsls = VslSet::from_records(&frame.vsls)?;
         let watch = Watch { progress: None, cancelled: Some(self.cancelled) };
-        let mut rendered = render(scene, &vsls, &self.args.options(&scene.render), watch)?;
-        rendered.film.metadata.frame = Some(frame.frame);
-        rendered.film.metadata.scene_hash = Some(frame.scene_hash);
-        rendered.film.metadata.photon_paths = Some(frame.statistics.pool_valid);
+        let rendered = self.renderer.render(scene, frame, &self.args.options(&scene.render), watch)?;
         let settings = scene.render.clone();
         self.write(Last { frame: frame.frame, rendered, settings })
     }

@@ -22,11 +22,11 @@ pub struct Vsl {
 /// The virtual surface lights of one frame, one array per field, all of equal length.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct VslSet {
-    pub(crate) position: Vec<Vec3>,
-    pub(crate) normal: Vec<Vec3>,
-    pub(crate) flux: Vec<Vec3>,
-    pub(crate) area: Vec<f32>,
-    pub(crate) object: Vec<u32>,
+    position: Vec<Vec3>,
+    normal: Vec<Vec3>,
+    flux: Vec<Vec3>,
+    area: Vec<f32>,
+    object: Vec<u32>,
 }
 
 impl VslSet {
@@ -72,6 +72,31 @@ impl VslSet {
         self.position.is_empty()
     }
 
+    /// Centres in metres from the scene's origin.
+    pub fn position(&self) -> &[Vec3] {
+        &self.position
+    }
+
+    /// Unit normals of the lit side.
+    pub fn normal(&self) -> &[Vec3] {
+        &self.normal
+    }
+
+    /// Fluxes in W, linear RGB.
+    pub fn flux(&self) -> &[Vec3] {
+        &self.flux
+    }
+
+    /// Areas in m².
+    pub fn area(&self) -> &[f32] {
+        &self.area
+    }
+
+    /// Indices of the objects that carry them.
+    pub fn object(&self) -> &[u32] {
+        &self.object
+    }
+
     /// The light number `index`.
     pub fn get(&self, index: usize) -> Option<Vsl> {
         (index < self.len()).then(|| Vsl {
@@ -81,6 +106,17 @@ impl VslSet {
             area: self.area[index],
             object: self.object[index],
         })
+    }
+}
+
+impl VslSet {
+    /// Radiosity in W m⁻² of light `index`, flux over area; zero for a light without area.
+    ///
+    /// # Panics
+    /// If there is no such light.
+    pub fn radiosity(&self, index: usize) -> Vec3 {
+        let area = self.area[index];
+        if area > 0.0 { self.flux[index] / area } else { Vec3::ZERO }
     }
 }
 

@@ -70,6 +70,9 @@ pub enum RenderError {
     /// Somebody asked to stop.
     #[error("cancelled")]
     Cancelled,
+    /// What renders has failed: a device is missing or lost, a picture does not fit.
+    #[error(transparent)]
+    Device(Box<dyn std::error::Error + Send + Sync>),
     /// The threads could not be started.
     #[error("{threads} render threads cannot be started: {reason}; choose fewer with --threads")]
     Threads {

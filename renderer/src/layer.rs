@@ -69,15 +69,18 @@ impl LayerKind {
         }
     }
 
-    pub(crate) fn needs_direct(self) -> bool {
+    /// Whether the layer shows direct light.
+    pub fn needs_direct(self) -> bool {
         matches!(self, Self::Full | Self::Direct)
     }
 
-    pub(crate) fn needs_indirect(self) -> bool {
+    /// Whether the layer shows indirect light.
+    pub fn needs_indirect(self) -> bool {
         matches!(self, Self::Full | Self::Indirect)
     }
 
-    pub(crate) fn needs_owner(self) -> bool {
+    /// Whether the layer shows which light owns a point.
+    pub fn needs_owner(self) -> bool {
         matches!(self, Self::Vsl | Self::Flux)
     }
 }

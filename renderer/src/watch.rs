@@ -19,7 +19,11 @@ impl std::fmt::Debug for Watch<'_> {
 }
 
 impl Watch<'_> {
-    pub(crate) fn check(&self) -> Result<(), RenderError> {
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// [`RenderError::Cancelled`].
+    pub fn check(&self) -> Result<(), RenderError> {
         match self.cancelled {
             // A flag alone: no other data hangs on it.
             Some(flag) if flag.load(Ordering::Relaxed) => Err(RenderError::Cancelled),
@@ -28,33 +32,17 @@ impl Watch<'_> {
     }
 
     /// Counts one finished piece of `total`.
-    pub(crate) fn advance(&self, done: &AtomicUsize, total: usize) {
+    pub fn advance(&self, done: &AtomicUsize, total: usize) {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         if let Some(progress) = self.progress {
             progress(done as f64 / total.max(1) as f64);
         }
     }
 
-    pub(crate) fn report(&self, share: f64) {
+    /// Tells the share that is done, in [0, 1].
+    pub fn report(&self, share: f64) {
         if let Some(progress) = self.progress {
             progress(share.clamp(0.0, 1.0));
         }
     }
-}
-
-/// Runs `work` on a pool of `threads` threads, or on rayon's own.
-pub(crate) fn on_threads<T: Send>(
-    threads: Option<usize>,
-    work: impl FnOnce() -> Result<T, RenderError> + Send,
-) -> Result<T, RenderError> {
-    let Some(threads) = threads else { return work() };
-    if threads == 0 {
-        let expected = "1 or more";
-        return Err(RenderError::Option { option: "threads", found: "0".into(), expected });
-    }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| RenderError::Threads { threads, reason: e.to_string() })?
-        .install(work)
 }

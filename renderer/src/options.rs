@@ -4,7 +4,7 @@ use crate::{LayerKind, RenderError};
 use photonstream_scene::{RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 
-/// How [`crate::render`] makes a picture.
+/// What a picture of virtual surface lights shall be like.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Picture width in pixels.
@@ -46,7 +46,11 @@ impl RenderOptions {
         }
     }
 
-    pub(crate) fn validate(&self) -> Result<(), RenderError> {
+    /// Whether every option is in its range.
+    ///
+    /// # Errors
+    /// [`RenderError::Option`] names the first that is not.
+    pub fn validate(&self) -> Result<(), RenderError> {
         let wrong = |option, found: String, expected| Err(RenderError::Option { option, found, expected });
         if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
             return wrong("epsilon", self.epsilon.to_string(), "0 or more, finite");
@@ -65,7 +69,8 @@ impl RenderOptions {
         Ok(())
     }
 
-    pub(crate) fn needs(&self, what: fn(LayerKind) -> bool) -> bool {
+    /// Whether any layer asked for has the given need, such as [`LayerKind::needs_direct`].
+    pub fn needs(&self, what: fn(LayerKind) -> bool) -> bool {
         self.layers.iter().any(|&layer| what(layer))
     }
 }
