@@ -9,10 +9,12 @@ pub mod basis;
 pub mod camera;
 pub mod kernel;
 pub mod light;
+pub mod octahedral;
 pub mod sampling;
 pub mod sobol;
 pub mod surface;
 pub mod tone;
+pub mod wgsl;
 
 pub use camera::Camera;
 pub use kernel::Kernel;

@@ -1,0 +1,97 @@
+//! Turns this crate's constants into WGSL, and names the shader twins of its functions.
+//!
+//! A twin has the file stem, names, parameter order and expression order of its Rust function. Constants are printed
+//! from Rust, never typed twice.
+
+use crate::{LightShape, surface, tone::ToneMap};
+use core::f32::consts::{FRAC_1_PI, PI};
+use std::fmt::Write;
+
+/// Twin of [`crate::kernel`].
+pub const KERNEL: &str = include_str!("../wgsl/kernel.wgsl");
+/// Twin of [`crate::camera`].
+pub const CAMERA: &str = include_str!("../wgsl/camera.wgsl");
+/// Twin of [`crate::light`]: what arrives, not what is emitted.
+pub const LIGHT: &str = include_str!("../wgsl/light.wgsl");
+/// Twin of [`crate::octahedral`].
+pub const OCTAHEDRAL: &str = include_str!("../wgsl/octahedral.wgsl");
+/// Twin of [`crate::sobol`].
+pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
+/// Twin of [`crate::tone`].
+pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
+
+/// Every twin with its file's stem.
+pub const TWINS: [(&str, &str); 6] = [
+    ("kernel", KERNEL),
+    ("camera", CAMERA),
+    ("light", LIGHT),
+    ("octahedral", OCTAHEDRAL),
+    ("sobol", SOBOL),
+    ("tone", TONE),
+];
+
+/// Number of a light's kind in shaders and in published records.
+pub fn light_kind(shape: &LightShape) -> u32 {
+    match shape {
+        LightShape::Point { .. } => 0,
+        LightShape::Spot { .. } => 1,
+        LightShape::Directional { .. } => 2,
+        LightShape::Parallelogram { .. } => 3,
+        LightShape::Triangle { .. } => 4,
+    }
+}
+
+const LIGHT_KINDS: [&str; 5] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM", "TRIANGLE"];
+
+/// The constants that shaders share with Rust, as WGSL declarations.
+pub fn constants() -> String {
+    let mut text = String::from("// Printed from Rust.\n");
+    let mut float = |name: &str, value: f32| {
+        // Bits, so that no decimal rounding comes between.
+        let _ = writeln!(text, "const {name}: f32 = bitcast<f32>({:#010x}u); // {value:e}", value.to_bits());
+    };
+    float("PI", PI);
+    float("FRAC_1_PI", FRAC_1_PI);
+    float("F32_MAX", f32::MAX);
+    float("RELATIVE_OFFSET", surface::RELATIVE_OFFSET);
+    for (number, name) in LIGHT_KINDS.iter().enumerate() {
+        let _ = writeln!(text, "const LIGHT_{name}: u32 = {number}u;");
+    }
+    for (number, map) in ToneMap::ALL.iter().enumerate() {
+        let _ = writeln!(text, "const TONE_MAP_{}: u32 = {number}u;", map.name().to_uppercase());
+    }
+    text
+}
+
+/// Number of a tone map in shaders.
+pub fn tone_map_number(map: ToneMap) -> u32 {
+    ToneMap::ALL.iter().position(|&m| m == map).expect("invariant: ALL has every tone map") as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn constants_have_their_values_and_kinds_their_numbers() {
+        let text = constants();
+        assert!(text.contains(&format!("PI: f32 = bitcast<f32>({:#010x}u)", PI.to_bits())), "{text}");
+        assert!(text.contains("const TONE_MAP_ACES: u32 = 2u;"), "{text}");
+        let shapes = [
+            LightShape::Point { position: Vec3::ZERO },
+            LightShape::Spot {
+                position: Vec3::ZERO,
+                direction: Vec3::X,
+                versine_inner: 0.1,
+                versine_outer: 0.2,
+            },
+            LightShape::Directional { direction: Vec3::X },
+            LightShape::Parallelogram { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
+            LightShape::Triangle { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
+        ];
+        for (shape, name) in shapes.iter().zip(LIGHT_KINDS) {
+            assert!(text.contains(&format!("const LIGHT_{name}: u32 = {}u;", light_kind(shape))), "{text}");
+        }
+    }
+}
