@@ -3,6 +3,8 @@
 
 mod error;
 mod gpu;
+mod layout;
+mod shader;
 
 pub use error::GpuError;
 pub use gpu::{AdapterChoice, Gpu, UNIFORM_BLOCK_BYTES, instance_flags};

@@ -47,8 +47,8 @@ const LIGHT_KINDS: [&str; 5] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM",
 pub fn constants() -> String {
     let mut text = String::from("// Printed from Rust.\n");
     let mut float = |name: &str, value: f32| {
-        // Bits, so that no decimal rounding comes between.
-        let _ = writeln!(text, "const {name}: f32 = bitcast<f32>({:#010x}u); // {value:e}", value.to_bits());
+        // Rust prints the shortest decimal that is read back as the same f32.
+        let _ = writeln!(text, "const {name}: f32 = {value:?}f;");
     };
     float("PI", PI);
     float("FRAC_1_PI", FRAC_1_PI);
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn constants_have_their_values_and_kinds_their_numbers() {
         let text = constants();
-        assert!(text.contains(&format!("PI: f32 = bitcast<f32>({:#010x}u)", PI.to_bits())), "{text}");
+        assert!(text.contains("const PI: f32 = 3.1415927f;"), "{text}");
         assert!(text.contains("const TONE_MAP_ACES: u32 = 2u;"), "{text}");
         let shapes = [
             LightShape::Point { position: Vec3::ZERO },

@@ -1,0 +1,136 @@
+//! Turns WGSL files and the constants printed from Rust into shader modules.
+
+use crate::layout;
+use photonstream_shading::wgsl;
+
+/// One shader module: its name and the files that it is made of, in order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Source {
+    pub(crate) name: &'static str,
+    pub(crate) parts: &'static [&'static str],
+}
+
+const FRAME: &str = include_str!("../wgsl/frame.wgsl");
+const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
+const VSL: &str = include_str!("../wgsl/vsl.wgsl");
+const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
+
+macro_rules! sources {
+    ($($constant:ident = $file:literal [$($part:expr),*];)*) => {
+        $(pub(crate) const $constant: Source = Source {
+            name: $file,
+            parts: &[$($part,)* include_str!(concat!("../wgsl/", $file, ".wgsl"))],
+        };)*
+
+        /// Every module of the renderer.
+        #[cfg(test)]
+        pub(crate) const ALL: &[Source] = &[$($constant,)*];
+    };
+}
+
+sources! {
+    GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION];
+    SHADOW_MAP = "shadow_map" [];
+    DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW];
+    UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
+    CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
+    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
+    SPLAT = "splat" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
+    FORWARD = "forward" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
+    INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
+    AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];
+    AO_SMOOTH = "ao_smooth" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
+    OWNER = "owner" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
+    COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
+    DISC = "disc" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
+    PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];
+}
+
+impl Source {
+    /// The whole text.
+    pub(crate) fn text(&self) -> String {
+        let mut text = wgsl::constants();
+        text.push_str(&layout::constants());
+        for part in self.parts {
+            text.push_str(part);
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The module on `device`.
+    pub(crate) fn module(&self, device: &wgpu::Device) -> wgpu::ShaderModule {
+        device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(self.name),
+            source: wgpu::ShaderSource::Wgsl(self.text().into()),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::naga;
+
+    fn parse(source: &Source) -> naga::Module {
+        let text = source.text();
+        naga::front::wgsl::parse_str(&text)
+            .unwrap_or_else(|error| panic!("{}: {}", source.name, error.emit_to_string(&text)))
+    }
+
+    /// Every module is valid with the base capabilities, without any device.
+    #[test]
+    fn every_module_is_valid() {
+        for source in ALL {
+            let module = parse(source);
+            let mut validator =
+                naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default());
+            if let Err(error) = validator.validate(&module) {
+                panic!("{}: {}", source.name, error.emit_to_string(&source.text()));
+            }
+            assert!(!module.entry_points.is_empty(), "{}", source.name);
+        }
+    }
+
+    /// Structures have the same names, offsets and sizes in Rust as in every module that has them, and each is in one.
+    #[test]
+    fn structures_are_the_same_on_both_sides() {
+        let mut seen = std::collections::HashSet::new();
+        for source in ALL {
+            let module = parse(source);
+            let mut layouter = naga::proc::Layouter::default();
+            layouter.update(module.to_ctx()).unwrap();
+            for (handle, ty) in module.types.iter() {
+                let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) else { continue };
+                let Some(&(shared, size, fields)) = layout::SHARED.iter().find(|(n, ..)| n == name) else { continue };
+                seen.insert(shared);
+                // Uniforms end on a multiple of 16 bytes; Rust says so by its own fields.
+                assert_eq!(*span as usize, size, "{}: {name}", source.name);
+                assert_eq!(layouter[handle].size as usize, size);
+                let found: Vec<_> = members
+                    .iter()
+                    .map(|m| {
+                        let size = layouter[m.ty].size as usize;
+                        (m.name.clone().unwrap(), m.offset as usize, size)
+                    })
+                    .collect();
+                let expected: Vec<_> = fields.iter().map(|&(n, o, s)| (n.to_owned(), o, s)).collect();
+                assert_eq!(found, expected, "{}: {name}", source.name);
+            }
+        }
+        assert_eq!(seen.len(), layout::SHARED.len(), "{seen:?}");
+    }
+
+    /// The published record, which is read as it is.
+    #[test]
+    fn records_are_read_where_they_are_written() {
+        use photonstream_protocol::VslRecord;
+        let module = parse(&UNPACK);
+        let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Record")).unwrap();
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("a structure") };
+        assert_eq!(*span as usize, size_of::<VslRecord>());
+        let found: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+        let expected: Vec<_> = VslRecord::FIELDS.iter().map(|f| (f.name, f.offset)).collect();
+        assert_eq!(found, expected);
+    }
+}

@@ -1,0 +1,27 @@
+// Turns the scene, drawn once for each light, into the irradiance that the lights add: without deferred shading.
+
+struct Batch {
+    lights: array<Vsl, BATCH_LIGHTS>,
+}
+
+@group(0) @binding(1) var<uniform> batch: Batch;
+
+struct Corner {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat, either) anchor: vec3f,
+    @location(1) @interpolate(flat, either) normal: vec3f,
+    @location(2) @interpolate(flat, either) light: u32,
+}
+
+@vertex
+fn corner(@location(0) position: vec3f, @location(1) normal: vec3f, @builtin(instance_index) light: u32) -> Corner {
+    return Corner(clip_from_world(position), position, normal, light);
+}
+
+@fragment
+fn add(in: Corner) -> @location(0) vec4f {
+    let direction = pixel_ray(vec2u(in.clip.xy));
+    let position = frame.camera.position + direction * plane_distance(in.anchor, in.normal, direction);
+    let normal = select(-in.normal, in.normal, dot(in.normal, direction) < 0.0);
+    return vec4f(vsl_irradiance(batch.lights[in.light], position, normal), 0.0);
+}
