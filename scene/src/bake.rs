@@ -4,10 +4,11 @@ use crate::{
     config::{Field, MAX_LENGTH_M},
     error::SceneError,
     placement::Placement,
+    pose::{self, Pose, RestMesh},
     primitives::Mesh,
     scene::{Geometry, Material, MaterialId, Object, ObjectId, Sides},
 };
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use photonstream_shading::{LightShape, light::Bounds, surface};
 
 /// Most vertices and most triangles of a scene: their indices are u32.
@@ -32,7 +33,7 @@ pub(crate) struct Emitter {
 }
 
 /// How much light an emitter's faces emit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Strength {
     /// W, for the one face.
     Power(DVec3),
@@ -47,11 +48,20 @@ pub(crate) enum EmitterFace {
     Triangle([u32; 3]),
 }
 
-/// The geometry of a scene; `lights` holds the shapes of each object's emitters.
+/// An object that emits: its faces with an area, and the lights they make.
+pub(crate) struct BakedEmitter {
+    pub(crate) object: ObjectId,
+    pub(crate) strength: Strength,
+    pub(crate) lights: Vec<(EmitterFace, LightShape)>,
+}
+
+/// The geometry of a scene.
 pub(crate) struct Baked {
     pub(crate) geometry: Geometry,
     pub(crate) objects: Vec<Object>,
-    pub(crate) emitters: Vec<(ObjectId, Strength, Vec<LightShape>)>,
+    pub(crate) rest_meshes: Vec<RestMesh>,
+    pub(crate) poses: Vec<Pose>,
+    pub(crate) emitters: Vec<BakedEmitter>,
     pub(crate) bounds: Bounds,
     pub(crate) notices: Vec<String>,
 }
@@ -64,7 +74,7 @@ pub(crate) fn bounding_box(parts: &[Part<'_>]) -> (DVec3, DVec3) {
     box_around(points)
 }
 
-fn box_around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+pub(crate) fn box_around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
 }
@@ -90,15 +100,16 @@ pub(crate) fn snapped_centre((low, high): (DVec3, DVec3)) -> DVec3 {
 /// # Errors
 /// If an object has no triangle with an area, or lies beyond what f32 can hold.
 pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) -> Result<Baked, SceneError> {
-    let mut geometry = Geometry::default();
+    let mut soup = Soup::default();
     let mut objects = Vec::with_capacity(parts.len());
+    let mut rest_meshes = Vec::with_capacity(parts.len());
+    let mut poses = Vec::with_capacity(parts.len());
     let mut emitters = Vec::new();
     let mut notices = Vec::new();
     for (index, part) in parts.into_iter().enumerate() {
         let id = ObjectId(index as u32);
-        let first_vertex = geometry.vertices.len();
-        let first_triangle = geometry.triangles.len() as u32;
-        if first_vertex + part.mesh.vertices.len() > MAX_ELEMENTS
+        let first_triangle = soup.triangles.len() as u32;
+        if soup.vertices.len() + part.mesh.vertices.len() > MAX_ELEMENTS
             || first_triangle as usize + part.mesh.triangles.len() > MAX_ELEMENTS
         {
             return Err(part.field.invalid(
@@ -107,9 +118,11 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
                 "use fewer segments or leave objects out",
             ));
         }
-        let world_from_rest = push_vertices(&mut geometry, &part, origin)?;
-        let dropped = push_triangles(&mut geometry, &part, id, first_vertex as u32);
-        let last_triangle = geometry.triangles.len() as u32;
+        let pose =
+            Pose { rotation: part.placement.rotation, offset: pose::offset(part.placement.position, origin) };
+        let rest = soup.push_vertices(&part, &pose)?;
+        let dropped = soup.push_triangles(&part, &rest, id);
+        let last_triangle = soup.triangles.len() as u32;
         if last_triangle == first_triangle {
             return Err(part.field.invalid(
                 format!("{dropped} triangles, none with an area (object \"{}\")", part.name),
@@ -125,21 +138,23 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             ));
         }
         if let Some(emitter) = &part.emitter {
-            let world = &geometry.vertices[first_vertex..];
-            let shapes = emitter.faces.iter().map(|face| light_shape(*face, world, &part.placement));
-            emitters.push((id, emitter.strength, shapes.filter(|s| s.area() > 0.0).collect()));
+            let shapes = emitter.faces.iter().map(|face| (*face, rest.light_shape(*face, &soup.vertices)));
+            let lights = shapes.filter(|(_, shape)| shape.area() > 0.0).collect();
+            emitters.push(BakedEmitter { object: id, strength: emitter.strength, lights });
         }
         objects.push(Object {
             name: part.name,
             material: material_id(materials, &part.material),
             sides: part.sides,
             triangles: first_triangle..last_triangle,
-            world_from_rest,
+            world_from_rest: pose.world_from_rest(rest.centre),
             emitter: None,
         });
+        rest_meshes.push(rest);
+        poses.push(pose);
     }
-    let bounds = sphere_around(&geometry.vertices);
-    Ok(Baked { geometry, objects, emitters, bounds, notices })
+    let bounds = sphere_around(&soup.vertices);
+    Ok(Baked { geometry: soup.into_geometry(), objects, rest_meshes, poses, emitters, bounds, notices })
 }
 
 /// The index of `name` in the ordered list of materials.
@@ -148,67 +163,74 @@ fn material_id(materials: &[Material], name: &str) -> MaterialId {
     MaterialId(index.expect("invariant: parts name materials that were checked or added") as u32)
 }
 
-/// World and rest vertices of a part. The world's come from the config's numbers directly, not by way of rest space:
-/// equal numbers give equal bits, so that neighbouring quads share their edges without a gap.
-fn push_vertices(geometry: &mut Geometry, part: &Part<'_>, origin: DVec3) -> Result<DAffine3, SceneError> {
-    let placement = &part.placement;
-    // Rest space is centred, so that a mesh given far from its own origin keeps its precision.
-    let used =
-        part.mesh.triangles.iter().flatten().map(|&i| placement.scale * part.mesh.vertices[i as usize]);
-    let rest_centre = snapped_centre(box_around(used));
-    for &vertex in &part.mesh.vertices {
-        let world = placement.apply(vertex) - origin;
-        if !world.is_finite() || world.abs().max_element() > MAX_LENGTH_M {
-            return Err(part.field.invalid(
-                format!("a vertex {world} m from the scene's origin"),
-                "all vertices within 1e9 m of it",
-                "move or shrink the object, or check its units",
-            ));
-        }
-        geometry.vertices.push(round(world));
-        geometry.rest_vertices.push(round(placement.scale * vertex - rest_centre));
-    }
-    let translation = placement.position - origin + placement.rotation * rest_centre;
-    Ok(DAffine3 { matrix3: placement.rotation, translation })
+/// The triangles of a scene while it is baked.
+#[derive(Default)]
+struct Soup {
+    vertices: Vec<Vec3>,
+    rest_vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<Vec3>,
+    object_of: Vec<ObjectId>,
 }
 
-/// To f32, without negative zeros: points that are equal have equal bits.
-fn round(point: DVec3) -> Vec3 {
-    point.as_vec3() + Vec3::ZERO
-}
-
-/// Adds the triangles that have an area, turned where the part is mirrored; returns how many have none.
-fn push_triangles(geometry: &mut Geometry, part: &Part<'_>, id: ObjectId, first_vertex: u32) -> u32 {
-    let mut dropped = 0;
-    for &[a, b, c] in &part.mesh.triangles {
-        let turned = if part.placement.is_mirrored() { [a, c, b] } else { [a, b, c] };
-        let triangle = turned.map(|i| i + first_vertex);
-        match surface::normal(triangle.map(|i| geometry.vertices[i as usize])) {
-            Some(normal) => {
-                geometry.triangles.push(triangle);
-                geometry.normals.push(normal);
-                geometry.object_of.push(id);
+impl Soup {
+    /// World and rest vertices of a part.
+    fn push_vertices(&mut self, part: &Part<'_>, pose: &Pose) -> Result<RestMesh, SceneError> {
+        let scale = part.placement.scale;
+        let scaled: Vec<DVec3> = part.mesh.vertices.iter().map(|&vertex| scale * vertex).collect();
+        // Rest space is centred, so that a mesh given far from its own origin keeps its precision.
+        let used = part.mesh.triangles.iter().flatten().map(|&i| scaled[i as usize]);
+        let centre = snapped_centre(box_around(used));
+        let first = self.vertices.len() as u32;
+        for &point in &scaled {
+            let world = pose.apply(point);
+            if !world.is_finite() || world.abs().max_element() > MAX_LENGTH_M {
+                return Err(part.field.invalid(
+                    format!("a vertex {world} m from the scene's origin"),
+                    "all vertices within 1e9 m of it",
+                    "move or shrink the object, or check its units",
+                ));
             }
-            None => dropped += 1,
+            self.vertices.push(pose::round(world));
+            self.rest_vertices.push(pose::round(point - centre));
+        }
+        let vertices = first..self.vertices.len() as u32;
+        Ok(RestMesh { scaled, vertices, centre, mirrored: part.placement.is_mirrored(), loaded: *pose })
+    }
+
+    /// Adds the triangles that have an area, turned where the part is mirrored; returns how many have none.
+    fn push_triangles(&mut self, part: &Part<'_>, rest: &RestMesh, id: ObjectId) -> u32 {
+        let mut dropped = 0;
+        for &[a, b, c] in &part.mesh.triangles {
+            let turned = if rest.mirrored { [a, c, b] } else { [a, b, c] };
+            let triangle = turned.map(|i| i + rest.vertices.start);
+            match surface::normal(triangle.map(|i| self.vertices[i as usize])) {
+                Some(normal) => {
+                    self.triangles.push(triangle);
+                    self.normals.push(normal);
+                    self.object_of.push(id);
+                }
+                None => dropped += 1,
+            }
+        }
+        dropped
+    }
+
+    fn into_geometry(self) -> Geometry {
+        Geometry {
+            vertices: self.vertices,
+            rest_vertices: self.rest_vertices.into(),
+            triangles: self.triangles.into(),
+            normals: self.normals,
+            object_of: self.object_of.into(),
         }
     }
-    dropped
 }
 
-fn light_shape(face: EmitterFace, world: &[Vec3], placement: &Placement) -> LightShape {
-    let (EmitterFace::Parallelogram(corners) | EmitterFace::Triangle(corners)) = face;
-    let [corner, u, v] = corners.map(|i| world[i as usize]);
-    let (edge_u, edge_v) =
-        if placement.is_mirrored() { (v - corner, u - corner) } else { (u - corner, v - corner) };
-    match face {
-        EmitterFace::Parallelogram(_) => LightShape::Parallelogram { corner, edge_u, edge_v },
-        EmitterFace::Triangle(_) => LightShape::Triangle { corner, edge_u, edge_v },
-    }
-}
-
-fn sphere_around(vertices: &[Vec3]) -> Bounds {
+/// The sphere around `vertices`: no vertex is outside.
+pub(crate) fn sphere_around(vertices: &[Vec3]) -> Bounds {
     let (low, high) = box_around(vertices.iter().map(|v| v.as_dvec3()));
-    let centre = round((low + high) * 0.5);
+    let centre = pose::round((low + high) * 0.5);
     let radius_sq = vertices.iter().map(|v| v.as_dvec3().distance_squared(centre.as_dvec3()));
     // Rounded up, so that no vertex is outside.
     let radius = (radius_sq.fold(0.0, f64::max).sqrt() as f32).next_up();

@@ -2,10 +2,11 @@
 
 use std::{fmt, io, path::PathBuf};
 
-/// A place in a scene file: the file, line and column counted from 1, and the field's dotted name.
+/// A place in a scene file: the file, line and column counted from 1, and the field's dotted name. An edit of a running
+/// scene has a field only.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The scene file as it was named when loaded.
+    /// The scene file as it was named when loaded; empty for an edit.
     pub file: PathBuf,
     /// Line and column, counted from 1 (columns in characters); `None` where the value is not in the file.
     pub line_column: Option<(usize, usize)>,
@@ -15,6 +16,9 @@ pub struct Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.file.as_os_str().is_empty() {
+            return f.write_str(&self.field);
+        }
         write!(f, "{}", self.file.display())?;
         if let Some((line, column)) = self.line_column {
             write!(f, ":{line}:{column}")?;

@@ -1,22 +1,25 @@
 //! Turns scene files into meshes, materials, lights, a camera and a ray-tracing structure.
 //!
 //! [`SceneConfig`] is what a user wrote, [`Scene`] what is valid: [`SceneConfig::from_file`] parses,
-//! [`SceneConfig::build`] validates and bakes, [`Scene::load`] does both. `configs/README.md` lists every key.
+//! [`SceneConfig::build`] validates and bakes, [`Scene::load`] does both; [`Scene::edit`] changes a loaded scene. `configs/README.md` lists every key.
 #![forbid(unsafe_code)]
 
 mod bake;
 mod build;
 pub mod bvh;
 pub mod config;
+mod edit;
 mod error;
 pub mod features;
 mod import;
 mod placement;
+mod pose;
 mod primitives;
 mod scene;
 mod settings;
 
 pub use config::SceneConfig;
+pub use edit::SceneEdit;
 pub use error::{Place, SceneError};
 pub use features::Features;
 pub use import::AssetRoots;

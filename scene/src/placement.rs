@@ -43,7 +43,7 @@ impl Placement {
 }
 
 /// Intrinsic XYZ: about x, then about the turned y, then about the twice turned z; R = Rx Ry Rz.
-fn rotation(degrees: DVec3) -> DMat3 {
+pub(crate) fn rotation(degrees: DVec3) -> DMat3 {
     let [(sx, cx), (sy, cy), (sz, cz)] = degrees.to_array().map(|d| sin_cos_turn(d / 360.0));
     let x = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cx, sx), DVec3::new(0.0, -sx, cx));
     let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));

@@ -1,8 +1,11 @@
 //! Gathers what a loaded scene is: baked geometry, materials, lights, camera, settings and the ray-tracing structure.
 
 use crate::{
+    bake::{EmitterFace, Strength},
     bvh::SceneBvh,
+    config::LightConfig,
     features::Features,
+    pose::{Pose, RestMesh},
     settings::{RenderSettings, StreamingSettings},
 };
 use glam::{DAffine3, DVec3, Vec3};
@@ -31,7 +34,8 @@ pub struct Scene {
     pub name: String,
     /// Hash of all that determines the scene: resolved text and the content of its assets. Equal on every machine.
     pub hash: u64,
-    /// The config with every default filled in and asset paths made absolute: a process that parses it gets this scene.
+    /// The config with every default filled in and asset paths made absolute: a process that parses it gets this scene
+    /// as it was loaded. Edits change neither text nor hash: they are published as records.
     pub resolved_text: Arc<str>,
     /// Where the scene's own origin lies in the coordinates of its config.
     pub origin_m: DVec3,
@@ -53,10 +57,14 @@ pub struct Scene {
     pub bvh: SceneBvh,
     /// The sphere around all geometry.
     pub bounds: Bounds,
-    /// What the scene contains, hence what has to be modelled.
+    /// What the scene contained when it was loaded, hence what has to be modelled.
     pub features: Features,
     /// What was repaired or left out while loading, one sentence each.
     pub notices: Vec<String>,
+    /// The mesh of each object, to be posed anew.
+    pub(crate) rest_meshes: Arc<[RestMesh]>,
+    /// How each object stands.
+    pub(crate) poses: Vec<Pose>,
 }
 
 /// The diffuse reflectance of a surface.
@@ -136,26 +144,34 @@ pub struct Object {
 pub struct SceneLight {
     /// Name in the config.
     pub name: String,
-    /// Shape and power, in the scene's space.
+    /// Shape and power, in the scene's space; no power while it is switched off.
     pub light: Light,
+    /// Whether it is switched on.
+    pub enabled: bool,
     /// The object that shows the emitter, for area lights.
     pub object: Option<ObjectId>,
+    /// What the config says of it, and edits since; `None` for lights with a surface.
+    pub(crate) written: Option<LightConfig>,
+    /// The face of `object` that emits, and how much.
+    pub(crate) face: Option<(EmitterFace, Strength)>,
 }
 
-/// All triangles of a scene. Triangles without area are left out at load; mirrored objects have their winding turned,
+/// All triangles of a scene; what does not change when objects move is shared by all versions of the scene.
+///
+/// Triangles without area are left out at load; mirrored objects have their winding turned,
 /// so that normals point outwards.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Geometry {
     /// Vertices in the scene's space.
     pub vertices: Vec<Vec3>,
     /// The same vertices in the rest space of their object.
-    pub rest_vertices: Vec<Vec3>,
+    pub rest_vertices: Arc<[Vec3]>,
     /// Vertex indices, counter-clockwise seen from the front; those of one object are contiguous.
-    pub triangles: Vec<[u32; 3]>,
+    pub triangles: Arc<[[u32; 3]]>,
     /// Unit geometric normal of the front of each triangle, in the scene's space.
     pub normals: Vec<Vec3>,
     /// The object of each triangle.
-    pub object_of: Vec<ObjectId>,
+    pub object_of: Arc<[ObjectId]>,
 }
 
 impl Geometry {

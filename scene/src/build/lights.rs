@@ -20,7 +20,7 @@ const MIN_HALF_ANGLE_DEG: f64 = 0.01;
 
 /// A light without a surface, in the config's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PlainLight {
+pub(crate) struct PlainLight {
     power: DVec3,
     shape: PlainShape,
 }
@@ -34,7 +34,7 @@ enum PlainShape {
 
 impl PlainLight {
     /// The light in the space of a scene around `origin`.
-    pub(super) fn around(self, origin: DVec3) -> Light {
+    pub(crate) fn around(self, origin: DVec3) -> Light {
         let shape = match self.shape {
             PlainShape::Point { position } => LightShape::Point { position: (position - origin).as_vec3() },
             PlainShape::Spot { position, direction, inner_deg, outer_deg } => LightShape::Spot {
@@ -65,41 +65,53 @@ pub(super) fn read<'a>(
     for (name, light) in table {
         let field = field.key(name);
         check_name(name, &field)?;
-        let LightConfig { power_w, irradiance_w_m2, spot, point, directional, rectangle } = light;
-        let shape = match (spot, point, directional, rectangle) {
-            (Some(spot), None, None, None) => read_spot(spot, &field.key("spot"))?,
-            (None, Some(point), None, None) => read_point(point, &field.key("point"))?,
-            (None, None, Some(directional), None) => {
-                read_directional(directional, &field.key("directional"))?
+        let Some(plain) = read_plain(light, &field)? else {
+            let LightConfig { power_w, irradiance_w_m2, rectangle, .. } = light;
+            let rectangle = rectangle.as_mut().expect("invariant: a light that is not plain is a rectangle");
+            let power = read_power(*power_w, *irradiance_w_m2, false, &field)?;
+            let part = read_rectangle(name, rectangle, power, &field, materials)?;
+            if inputs.parts.contains_key(name) {
+                return Err(field.invalid(
+                    format!("the name \"{name}\" twice, for an object and for this rectangle"),
+                    "different names: the object that shows a rectangle is called like its light",
+                    "rename one of them",
+                ));
             }
-            (None, None, None, Some(rectangle)) => {
-                let power = read_power(*power_w, *irradiance_w_m2, false, &field)?;
-                let part = read_rectangle(name, rectangle, power, &field, materials)?;
-                if inputs.parts.contains_key(name) {
-                    return Err(field.invalid(
-                        format!("the name \"{name}\" twice, for an object and for this rectangle"),
-                        "different names: the object that shows a rectangle is called like its light",
-                        "rename one of them",
-                    ));
-                }
-                inputs.parts.insert(name.clone(), part);
-                continue;
-            }
-            (spot, point, directional, rectangle) => {
-                let given = [
-                    ("spot", spot.is_some()),
-                    ("point", point.is_some()),
-                    ("directional", directional.is_some()),
-                    ("rectangle", rectangle.is_some()),
-                ];
-                return Err(not_one_shape(&field, &given));
-            }
+            inputs.parts.insert(name.clone(), part);
+            continue;
         };
-        let irradiance = matches!(shape, PlainShape::Directional { .. });
-        let power = read_power(*power_w, *irradiance_w_m2, irradiance, &field)?;
-        inputs.lights.insert(name.clone(), PlainLight { power, shape });
+        inputs.lights.insert(name.clone(), plain);
     }
     Ok(())
+}
+
+/// A light without a surface; `None` for a rectangle. Fills in the defaults.
+///
+/// # Errors
+/// If it has not exactly one shape, or a value is not valid.
+pub(crate) fn read_plain(
+    light: &mut LightConfig,
+    field: &Field<'_>,
+) -> Result<Option<PlainLight>, SceneError> {
+    let LightConfig { power_w, irradiance_w_m2, spot, point, directional, rectangle } = light;
+    let shape = match (spot, point, directional, rectangle) {
+        (Some(spot), None, None, None) => read_spot(spot, &field.key("spot"))?,
+        (None, Some(point), None, None) => read_point(point, &field.key("point"))?,
+        (None, None, Some(directional), None) => read_directional(directional, &field.key("directional"))?,
+        (None, None, None, Some(_)) => return Ok(None),
+        (spot, point, directional, rectangle) => {
+            let given = [
+                ("spot", spot.is_some()),
+                ("point", point.is_some()),
+                ("directional", directional.is_some()),
+                ("rectangle", rectangle.is_some()),
+            ];
+            return Err(not_one_shape(field, &given));
+        }
+    };
+    let irradiance = matches!(shape, PlainShape::Directional { .. });
+    let power = read_power(*power_w, *irradiance_w_m2, irradiance, field)?;
+    Ok(Some(PlainLight { power, shape }))
 }
 
 /// The error of a table that should have exactly one of some keys.
@@ -112,7 +124,7 @@ pub(super) fn not_one_shape(field: &Field<'_>, keys: &[(&str, bool)]) -> SceneEr
     field.invalid(found, format!("exactly one of {}", all.join(", ")), remedy)
 }
 
-fn read_power(
+pub(crate) fn read_power(
     power: Option<OneOrThree>,
     irradiance: Option<OneOrThree>,
     wants_irradiance: bool,

@@ -2,15 +2,15 @@
 
 mod camera;
 mod imported;
-mod lights;
+pub(crate) mod lights;
 mod materials;
 mod objects;
 mod settings;
 
 use crate::{
-    bake::{self, Baked, Part, Strength},
+    bake::{self, Baked, BakedEmitter, Part, Strength},
     bvh::SceneBvh,
-    config::{Document, Field, SceneConfig},
+    config::{Document, Field, LightConfig, SceneConfig},
     error::SceneError,
     features::Features,
     import::AssetRoots,
@@ -87,8 +87,8 @@ impl SceneConfig {
         let materials = materials.into_list();
         let baked = bake::bake(parts, origin_m, &materials)?;
         notices.extend(baked.notices.iter().cloned());
-        let (baked, lights) = join_lights(baked, inputs.lights, origin_m);
-        let Baked { geometry, objects, bounds, .. } = baked;
+        let (baked, lights) = join_lights(baked, inputs.lights, &self.light, origin_m);
+        let Baked { geometry, objects, rest_meshes, poses, bounds, .. } = baked;
 
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
         let bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
@@ -110,6 +110,8 @@ impl SceneConfig {
             bounds,
             features,
             notices,
+            rest_meshes: rest_meshes.into(),
+            poses,
         })
     }
 }
@@ -131,20 +133,31 @@ fn stem(document: &Document) -> String {
 fn join_lights(
     mut baked: Baked,
     plain: BTreeMap<String, lights::PlainLight>,
+    written: &BTreeMap<String, LightConfig>,
     origin: DVec3,
 ) -> (Baked, Vec<SceneLight>) {
     let mut lights: Vec<SceneLight> = plain
         .into_iter()
-        .map(|(name, light)| SceneLight { name, light: light.around(origin), object: None })
+        .map(|(name, light)| SceneLight {
+            written: written.get(&name).cloned(),
+            name,
+            light: light.around(origin),
+            enabled: true,
+            object: None,
+            face: None,
+        })
         .collect();
-    for (id, strength, shapes) in std::mem::take(&mut baked.emitters) {
-        let name = &baked.objects[id.0 as usize].name;
+    for BakedEmitter { object, strength, lights: shapes } in std::mem::take(&mut baked.emitters) {
+        let name = &baked.objects[object.0 as usize].name;
         let digits = shapes.len().saturating_sub(1).to_string().len();
         let single = shapes.len() == 1;
-        lights.extend(shapes.into_iter().enumerate().map(|(i, shape)| SceneLight {
+        lights.extend(shapes.into_iter().enumerate().map(|(i, (face, shape))| SceneLight {
             name: if single { name.clone() } else { format!("{name}/{i:0digits$}") },
             light: area_light(shape, strength),
-            object: Some(id),
+            enabled: true,
+            object: Some(object),
+            written: None,
+            face: Some((face, strength)),
         }));
     }
     lights.sort_by(|a, b| a.name.cmp(&b.name));
@@ -156,7 +169,8 @@ fn join_lights(
     (baked, lights)
 }
 
-fn area_light(shape: LightShape, strength: Strength) -> Light {
+/// The light of an emitting face.
+pub(crate) fn area_light(shape: LightShape, strength: Strength) -> Light {
     let power = match strength {
         Strength::Power(power) => power,
         Strength::Radiance(radiance) => radiance * (PI * f64::from(shape.area())),

@@ -79,6 +79,15 @@ impl<'de> de::Visitor<'de> for Components {
         }
     }
 
+    // TOML has signed integers only, JSON both.
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<[f64; 3], E> {
+        if self.one {
+            Ok([value as f64; 3])
+        } else {
+            Err(E::invalid_type(de::Unexpected::Unsigned(value), &self))
+        }
+    }
+
     fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<[f64; 3], A::Error> {
         let mut values = Vec::with_capacity(3);
         while let Some(value) = seq.next_element::<f64>()? {

@@ -1,0 +1,212 @@
+//! Turns edits of lights and objects into a new version of a scene, which shares all that they leave alone.
+
+mod light;
+mod object;
+mod values;
+
+use crate::{
+    bake,
+    build::area_light,
+    config::{Document, Field, MAX_LENGTH_M},
+    error::{SceneError, nearest},
+    pose::{self, Pose},
+    scene::{LightId, ObjectId, Scene},
+};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use photonstream_shading::{Light, surface};
+use std::{collections::BTreeMap, sync::Arc};
+
+pub(crate) use values::Values;
+
+/// Largest deviation of a rotation matrix from an orthonormal one.
+const ORTHONORMAL_TO: f64 = 1e-9;
+
+/// Edits of a scene: each is validated when it is made, and all are applied at once.
+///
+/// Of several edits of one object only the last costs anything.
+#[derive(Clone, Debug)]
+pub struct SceneEdit {
+    scene: Scene,
+    poses: BTreeMap<ObjectId, Pose>,
+}
+
+impl Scene {
+    /// Begins to edit this version of the scene.
+    pub fn edit(&self) -> SceneEdit {
+        SceneEdit { scene: self.clone(), poses: BTreeMap::new() }
+    }
+
+    /// The scene with another light in the place of `id`: of the same kind, in the scene's space.
+    ///
+    /// # Errors
+    /// If there is no such light, or a value is not finite or outside its domain.
+    pub fn with_light(&self, id: LightId, light: Light) -> Result<Self, SceneError> {
+        let mut edit = self.edit();
+        edit.replace_light(id, light)?;
+        Ok(edit.finish())
+    }
+
+    /// The scene with an object moved to where the rigid motion `world_from_rest` puts it; its emitting faces move along.
+    ///
+    /// An object put back where it was gives the scene as it was, bit for bit. Positions in the scene's space, m.
+    ///
+    /// # Errors
+    /// If there is no such object, the motion is not rigid, or it leads beyond what f32 can hold.
+    pub fn with_object_placed(&self, id: ObjectId, world_from_rest: DAffine3) -> Result<Self, SceneError> {
+        let mut edit = self.edit();
+        edit.place_object(id, world_from_rest)?;
+        Ok(edit.finish())
+    }
+}
+
+impl SceneEdit {
+    /// Puts another light in the place of `id`; see [`Scene::with_light`].
+    ///
+    /// # Errors
+    /// As [`Scene::with_light`].
+    pub fn replace_light(&mut self, id: LightId, light: Light) -> Result<(), SceneError> {
+        light::replace(&mut self.scene, id, light)
+    }
+
+    /// Changes the light called `name` by the keys of its table in a config, and `enabled`. Positions are in the
+    /// config's coordinates.
+    ///
+    /// # Errors
+    /// If there is no such light or key, or a value is not valid; nothing is changed then.
+    pub fn set_light(&mut self, name: &str, values: &Values) -> Result<LightId, SceneError> {
+        light::set(&mut self.scene, name, values)
+    }
+
+    /// Moves an object; see [`Scene::with_object_placed`].
+    ///
+    /// # Errors
+    /// As [`Scene::with_object_placed`].
+    pub fn place_object(&mut self, id: ObjectId, world_from_rest: DAffine3) -> Result<(), SceneError> {
+        let document = Document::default();
+        let field = Field::root(&document).key("object");
+        let Some(object) = self.scene.objects.get(id.0 as usize) else {
+            let count = self.scene.objects.len();
+            return Err(field.invalid(
+                format!("object {}", id.0),
+                format!("a number below {count}"),
+                "choose another object",
+            ));
+        };
+        if object.world_from_rest == world_from_rest {
+            self.poses.insert(id, self.scene.poses[id.0 as usize]);
+            return Ok(());
+        }
+        let field = field.key(&object.name).key("world_from_rest");
+        let matrix = world_from_rest.matrix3;
+        let error = (matrix.transpose() * matrix - DMat3::IDENTITY).to_cols_array();
+        if !(error.iter().all(|x| x.abs() <= ORTHONORMAL_TO) && matrix.determinant() > 0.0) {
+            return Err(field.invalid(
+                matrix,
+                "a rotation: orthonormal columns, not mirrored",
+                "place objects by rigid motions",
+            ));
+        }
+        let mesh = &self.scene.rest_meshes[id.0 as usize];
+        // Where it was loaded, exactly: a motion alone gives a pose to the rounding of f64.
+        let back = mesh.loaded.world_from_rest(mesh.centre) == world_from_rest;
+        let pose = if back { mesh.loaded } else { Pose::from_motion(&world_from_rest, mesh.centre) };
+        self.pose_object(id, pose, &field)
+    }
+
+    /// Moves the object called `name`, or all objects that the import `name` has made, by the keys `position_m` and
+    /// `rotation_deg` of a config; what is not given stays. Positions are in the config's coordinates.
+    ///
+    /// # Errors
+    /// If there is no such object or key, or a value is not valid; nothing is changed then.
+    pub fn move_object(&mut self, name: &str, values: &Values) -> Result<Vec<ObjectId>, SceneError> {
+        object::set(self, name, values)
+    }
+
+    /// The edited scene.
+    ///
+    /// It keeps the triangles that it was loaded with: those without an area at load stay left out, and those that lose
+    /// theirs to rounding are kept and never hit. Features, text and hash stay those of the loaded scene.
+    pub fn finish(self) -> Scene {
+        let Self { mut scene, poses } = self;
+        let moves: Vec<(ObjectId, Pose)> =
+            poses.into_iter().filter(|(id, pose)| scene.poses[id.0 as usize] != *pose).collect();
+        if moves.is_empty() {
+            return scene;
+        }
+        let geometry = Arc::make_mut(&mut scene.geometry);
+        let triangles = Arc::clone(&geometry.triangles);
+        for (id, pose) in &moves {
+            let mesh = &scene.rest_meshes[id.0 as usize];
+            let object = &mut scene.objects[id.0 as usize];
+            object.world_from_rest = pose.world_from_rest(mesh.centre);
+            scene.poses[id.0 as usize] = *pose;
+            let range = mesh.vertices.start as usize..mesh.vertices.end as usize;
+            for (vertex, &scaled) in geometry.vertices[range].iter_mut().zip(&mesh.scaled) {
+                *vertex = pose::round(pose.apply(scaled));
+            }
+            for triangle in object.triangles.clone() {
+                geometry.normals[triangle as usize] = surface::normal(geometry.triangle(triangle))
+                    .or_else(|| turned_normal(geometry.rest_triangle(triangle), pose))
+                    .unwrap_or(geometry.normals[triangle as usize]);
+            }
+            scene.bvh.rebuild_part(id.0 as usize, &geometry.vertices, &triangles);
+        }
+        scene.bounds = bake::sphere_around(&geometry.vertices);
+        for light in &mut scene.lights {
+            let (Some(object), Some((face, strength))) = (light.object, light.face) else { continue };
+            if moves.iter().any(|(id, _)| *id == object) {
+                let shape = scene.rest_meshes[object.0 as usize].light_shape(face, &scene.geometry.vertices);
+                light.light = area_light(shape, strength);
+                if !light.enabled {
+                    light.light.power = Vec3::ZERO;
+                }
+            }
+        }
+        scene
+    }
+
+    /// The pose of an object, edits included.
+    fn pose(&self, id: ObjectId) -> Pose {
+        *self.poses.get(&id).unwrap_or(&self.scene.poses[id.0 as usize])
+    }
+
+    fn pose_object(&mut self, id: ObjectId, pose: Pose, field: &Field<'_>) -> Result<(), SceneError> {
+        let mesh = &self.scene.rest_meshes[id.0 as usize];
+        let farthest = mesh.scaled.iter().map(|&p| pose.apply(p)).find(|p| is_far(*p));
+        if let Some(world) = farthest {
+            return Err(field.invalid(
+                format!("a vertex {world} m from the scene's origin"),
+                "all vertices within 1e9 m of it",
+                "move it nearer",
+            ));
+        }
+        self.poses.insert(id, pose);
+        Ok(())
+    }
+}
+
+/// Whether a point is beyond what f32 can hold well, or not finite.
+fn is_far(point: DVec3) -> bool {
+    !point.is_finite() || point.abs().max_element() > MAX_LENGTH_M
+}
+
+/// The normal of a triangle that has no area in the scene's space, from rest space.
+fn turned_normal(rest: [Vec3; 3], pose: &Pose) -> Option<Vec3> {
+    surface::normal(rest).and_then(|n| (pose.rotation * n.as_dvec3()).as_vec3().try_normalize())
+}
+
+/// The error of a name that nothing has.
+fn unknown_name<'a>(
+    field: &Field<'_>,
+    kind: &'static str,
+    found: &str,
+    known: impl Iterator<Item = &'a str> + Clone,
+) -> SceneError {
+    SceneError::UnknownName {
+        place: field.place(),
+        kind,
+        found: found.to_owned(),
+        nearest: nearest(found, known.clone()),
+        known: known.map(str::to_owned).collect(),
+    }
+}
