@@ -5,6 +5,8 @@ mod error;
 mod gpu;
 mod layout;
 mod shader;
+#[cfg(test)]
+mod test_gpu;
 
 pub use error::GpuError;
 pub use gpu::{AdapterChoice, Gpu, UNIFORM_BLOCK_BYTES, instance_flags};
