@@ -1,1 +1,3 @@
-fn main(){}
+//! The window as a program of its own.
+#![forbid(unsafe_code)]
+fn main() {}

@@ -60,7 +60,7 @@ impl Navigation {
     /// Circles about the pivot: `dx` to the right and `dy` down, in radians of turning the scene by hand.
     pub fn orbit(&mut self, dx: f32, dy: f32) {
         let pivot = self.camera.position + self.camera.forward * self.distance;
-        self.turn(-dx, -dy);
+        self.turn(dx, -dy);
         self.move_to(pivot - self.camera.forward * self.distance);
     }
 
@@ -87,6 +87,9 @@ impl Navigation {
 
     /// Goes nearer by so many notches of the wheel, away from the pivot by negative ones.
     pub fn dolly(&mut self, notches: f32) {
+        if !notches.is_finite() {
+            return;
+        }
         let distance = self.distance * NOTCH.powf(notches.clamp(-50.0, 50.0));
         self.move_to(self.camera.position + self.camera.forward * (self.distance - distance));
         // Past the pivot the camera goes on, and takes it along.
