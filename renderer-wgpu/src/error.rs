@@ -28,6 +28,16 @@ pub enum GpuError {
         /// What to do instead.
         remedy: &'static str,
     },
+    /// An option is out of its range.
+    #[error("{option}: found {found}, expected {expected}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// What was given.
+        found: String,
+        /// What is possible.
+        expected: &'static str,
+    },
     /// A picture, a scene or a set of lights is too large for the device.
     #[error("{what}: found {found}, expected at most {limit} on {adapter}; {remedy}")]
     TooLarge {
@@ -41,6 +51,14 @@ pub enum GpuError {
         adapter: String,
         /// What to do instead.
         remedy: &'static str,
+    },
+    /// The device has too little memory.
+    #[error("{what} does not fit into the device's memory ({reason}); choose a smaller --size")]
+    OutOfMemory {
+        /// What did not fit.
+        what: String,
+        /// What the driver said.
+        reason: String,
     },
     /// The device reported an error: a bug of this renderer or of the driver, or memory has run out.
     #[error("the graphics device reported: {reason}")]
@@ -71,6 +89,9 @@ fn list(reasons: &[String]) -> String {
 
 impl From<GpuError> for RenderError {
     fn from(error: GpuError) -> Self {
-        Self::Device(Box::new(error))
+        match error {
+            GpuError::Option { option, found, expected } => Self::Option { option, found, expected },
+            error => Self::Device(Box::new(error)),
+        }
     }
 }

@@ -122,7 +122,8 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::TimedOut`], [`GpuError::Lost`], or what went wrong before.
     pub fn wait(&self) -> Result<(), GpuError> {
-        let waited = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_LIMIT) });
+        let waited =
+            self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_LIMIT) });
         self.check()?;
         waited.map(|_| ()).map_err(|_| GpuError::TimedOut { seconds: WAIT_LIMIT.as_secs() })
     }
@@ -163,7 +164,11 @@ fn unsuitable(
     }
     let limits = adapter.limits();
     let needed = [
-        ("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, u64::from(UNIFORM_BLOCK_BYTES)),
+        (
+            "max_uniform_buffer_binding_size",
+            limits.max_uniform_buffer_binding_size,
+            u64::from(UNIFORM_BLOCK_BYTES),
+        ),
         ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into(), 6),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup.into(), 64),
         ("max_color_attachment_bytes_per_sample", limits.max_color_attachment_bytes_per_sample.into(), 32),

@@ -1,12 +1,35 @@
 //! Turns published virtual surface lights into pictures on the GPU: paper A's deferred renderer, on wgpu.
 #![deny(unsafe_code)]
 
+mod deferred;
 mod error;
+mod gather;
+mod geometry;
 mod gpu;
 mod layout;
+mod openness;
+mod owners;
+mod picture;
+mod pipelines;
+mod present;
+mod readback;
+mod renderer;
+mod scope;
 mod shader;
+mod shadow_maps;
+mod shadow_views;
+mod stages;
+mod targets;
 #[cfg(test)]
 mod test_gpu;
+mod timer;
+mod view;
+mod vsl_buffer;
 
 pub use error::GpuError;
 pub use gpu::{AdapterChoice, Gpu, UNIFORM_BLOCK_BYTES, instance_flags};
+pub use picture::{Choices, WgpuRenderer};
+pub use renderer::{Drawn, Renderer};
+pub use timer::PassTime;
+pub use view::{Accumulation, Shadows, Show, View};
+pub use vsl_buffer::Upload;

@@ -83,8 +83,10 @@ mod tests {
     fn every_module_is_valid() {
         for source in ALL {
             let module = parse(source);
-            let mut validator =
-                naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default());
+            let mut validator = naga::valid::Validator::new(
+                naga::valid::ValidationFlags::all(),
+                naga::valid::Capabilities::default(),
+            );
             if let Err(error) = validator.validate(&module) {
                 panic!("{}: {}", source.name, error.emit_to_string(&source.text()));
             }
@@ -101,8 +103,12 @@ mod tests {
             let mut layouter = naga::proc::Layouter::default();
             layouter.update(module.to_ctx()).unwrap();
             for (handle, ty) in module.types.iter() {
-                let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) else { continue };
-                let Some(&(shared, size, fields)) = layout::SHARED.iter().find(|(n, ..)| n == name) else { continue };
+                let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) else {
+                    continue;
+                };
+                let Some(&(shared, size, fields)) = layout::SHARED.iter().find(|(n, ..)| n == name) else {
+                    continue;
+                };
                 seen.insert(shared);
                 // Uniforms end on a multiple of 16 bytes; Rust says so by its own fields.
                 assert_eq!(*span as usize, size, "{}: {name}", source.name);

@@ -1,7 +1,7 @@
 //! Turns what the user does into requests to the simulator, the newest of each kind only, from a thread of its own.
 
 use crate::WindowError;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use photonstream_protocol::{ChannelName, ControlClient, ProtocolError, Reply, Request};
 use serde_json::{Map, Value, json};
 use std::{
@@ -91,29 +91,6 @@ impl Commands {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner).push(request);
         self.shared.1.notify_one();
     }
-
-    /// Puts a light elsewhere, in the coordinates of the config.
-    pub fn place_light(&self, name: &str, position_m: DVec3) {
-        self.send(Request::SetLight { name: name.into(), values: value("position_m", place(position_m)) });
-    }
-
-    /// Gives a light another power: W, or W/m² for parallel light.
-    pub fn power_light(&self, name: &str, power: [f32; 3], is_parallel: bool) {
-        let key = if is_parallel { "irradiance_w_m2" } else { "power_w" };
-        // Six digits, so that messages and files read 12.5 and not 12.499999046325684.
-        let power = power.map(|p| json!(format!("{p:.6e}").parse::<f64>().unwrap_or(0.0)));
-        self.send(Request::SetLight { name: name.into(), values: value(key, Value::from(power.to_vec())) });
-    }
-
-    /// Switches a light on or off.
-    pub fn switch_light(&self, name: &str, enabled: bool) {
-        self.send(Request::SetLight { name: name.into(), values: value("enabled", json!(enabled)) });
-    }
-
-    /// Puts an object elsewhere, in the coordinates of the config.
-    pub fn place_object(&self, name: &str, position_m: DVec3) {
-        self.send(Request::MoveObject { name: name.into(), values: value("position_m", place(position_m)) });
-    }
 }
 
 impl Drop for Commands {
@@ -122,6 +99,29 @@ impl Drop for Commands {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
         self.shared.1.notify_one();
     }
+}
+
+/// Puts a light elsewhere, in the coordinates of the config.
+pub fn place_light(name: &str, position_m: DVec3) -> Request {
+    Request::SetLight { name: name.into(), values: value("position_m", place(position_m)) }
+}
+
+/// Gives a light another power: W, or W/m² for parallel light.
+pub fn power_light(name: &str, power: Vec3, is_parallel: bool) -> Request {
+    let key = if is_parallel { "irradiance_w_m2" } else { "power_w" };
+    // Six digits, so that messages and files read 12.5 and not 12.499999046325684.
+    let digits = |p: f32| format!("{p:.5e}").parse::<f64>().unwrap_or(0.0);
+    Request::SetLight { name: name.into(), values: value(key, json!(power.to_array().map(digits))) }
+}
+
+/// Switches a light on or off.
+pub fn switch_light(name: &str, enabled: bool) -> Request {
+    Request::SetLight { name: name.into(), values: value("enabled", json!(enabled)) }
+}
+
+/// Puts an object elsewhere, in the coordinates of the config.
+pub fn place_object(name: &str, position_m: DVec3) -> Request {
+    Request::MoveObject { name: name.into(), values: value("position_m", place(position_m)) }
 }
 
 fn value(key: &str, value: Value) -> Map<String, Value> {
@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     fn place_of(name: &str, x: f64) -> Request {
-        Request::MoveObject { name: name.into(), values: value("position_m", place(DVec3::X * x)) }
+        place_object(name, DVec3::X * x)
     }
 
     #[test]
@@ -195,15 +195,15 @@ mod tests {
         let mut queue = Queue::default();
         for i in 0..100 {
             queue.push(place_of("ball", f64::from(i)));
-            queue.push(Request::SetLight { name: "ball".into(), values: value("enabled", json!(i % 2 == 0)) });
+            queue.push(switch_light("ball", i % 2 == 0));
         }
         queue.push(Request::Pause);
-        queue.push(Request::SetLight { name: "ball".into(), values: value("power_w", json!([1, 2, 3])) });
+        queue.push(power_light("ball", Vec3::new(0.1, 12.5, 3e-7), false));
         queue.push(place_of("box", 1.0));
         queue.push(Request::Step);
         queue.push(Request::Step);
         let mut both = value("enabled", json!(false));
-        both.insert("power_w".into(), json!([1, 2, 3]));
+        both.insert("power_w".into(), json!([0.1, 12.5, 3e-7]));
         let expected = [
             place_of("ball", 99.0),
             Request::SetLight { name: "ball".into(), values: both },
@@ -225,12 +225,12 @@ mod tests {
         let (sender, told) = std::sync::mpsc::channel();
         let channel = format!("no-such-{}", std::process::id()).parse().unwrap();
         let commands = Commands::start(channel, move |t| sender.send(t).unwrap()).unwrap();
-        commands.place_light("lamp", DVec3::ONE);
+        commands.send(place_light("lamp", DVec3::ONE));
         let Told::Failed { request: Request::SetLight { name, .. }, reason } = told.recv().unwrap() else {
             panic!("sent to nobody")
         };
         assert!(name == "lamp" && reason.contains("no-such-"), "{reason}");
-        commands.switch_light("lamp", false);
+        commands.send(switch_light("lamp", false));
         assert!(matches!(told.recv().unwrap(), Told::Failed { .. }));
     }
 }

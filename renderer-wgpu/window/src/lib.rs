@@ -1,2 +1,30 @@
 //! Turns a running simulation into a window: what the GPU renderer draws, and hands for camera, lights and objects.
+//!
+//! [`run`] opens the window and stays until it is closed. Three threads: the window's own draws and never waits for the
+//! simulator; one follows the channel and wakes the window for news; one talks to the simulator's control socket. While
+//! nothing changes, nothing is drawn.
 #![forbid(unsafe_code)]
+
+mod application;
+mod arguments;
+mod choices;
+mod commands;
+mod dragging;
+mod error;
+mod following;
+mod graphics;
+mod interface;
+mod keys;
+mod latency;
+mod navigation;
+mod notices;
+mod overlay;
+mod picking;
+mod pointer;
+mod screenshot;
+mod session;
+mod standing;
+
+pub use application::{Ended, Report, run};
+pub use arguments::Args;
+pub use error::WindowError;

@@ -1,0 +1,155 @@
+//! Turns geometry into the G-buffer, lights into direct irradiance, and both with the indirect light into a layer.
+
+use crate::{
+    Gpu,
+    geometry::Geometry,
+    layout::Corner,
+    pipelines::{self, Drawing, texture, whole},
+    scope::Scope,
+    shader,
+    shadow_maps::ShadowMaps,
+    targets::{DEPTH, GBUFFER, HDR, Target, Targets},
+};
+use glam::Vec3;
+use photonstream_scene::Features;
+use wgpu::TextureUsages;
+
+/// What the direct pass is specialised for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct DirectKind {
+    pub(crate) delta_lights: bool,
+    pub(crate) area_lights: bool,
+    pub(crate) shadows: bool,
+}
+
+impl DirectKind {
+    pub(crate) fn of(features: &Features, shadows: bool) -> Self {
+        let delta_lights = features.point_lights + features.spot_lights + features.directional_lights > 0;
+        Self { delta_lights, area_lights: features.area_lights > 0, shadows }
+    }
+}
+
+/// The passes that every picture has.
+#[derive(Debug)]
+pub(crate) struct Deferred {
+    gbuffer: wgpu::RenderPipeline,
+    direct: Option<(DirectKind, wgpu::RenderPipeline)>,
+    composite: wgpu::RenderPipeline,
+    /// Stands in for what a picture does not need.
+    pub(crate) open: Target,
+    nobody: Target,
+}
+
+/// What a composite reads beside the targets of its picture.
+pub(crate) struct Shown<'a> {
+    pub(crate) objects: &'a wgpu::Buffer,
+    pub(crate) indirect: &'a wgpu::TextureView,
+    pub(crate) openness: Option<&'a wgpu::TextureView>,
+    pub(crate) owners: Option<&'a wgpu::TextureView>,
+    pub(crate) colours: &'a wgpu::Buffer,
+    pub(crate) tallies: &'a wgpu::Buffer,
+}
+
+impl Deferred {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let set = Drawing {
+            vertex: "corner",
+            fragment: Some("surface"),
+            format: Some(GBUFFER),
+            corners: Some(Corner::layout()),
+            depth: Some(depth_test(true, wgpu::CompareFunction::Greater)),
+            ..Drawing::default()
+        };
+        let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
+        let open = Target::new(gpu, "open", [1, 1], crate::targets::OPENNESS, usage);
+        let size = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
+        let row = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4), rows_per_image: None };
+        gpu.queue.write_texture(open.texture.as_image_copy(), bytemuck::bytes_of(&1f32), row, size);
+        Self {
+            gbuffer: pipelines::drawing(gpu, &shader::GBUFFER, &set),
+            direct: None,
+            composite: pipelines::covering(gpu, &shader::COMPOSITE, "layer", HDR, &[]),
+            open,
+            nobody: Target::new(gpu, "nobody", [1, 1], GBUFFER, usage),
+        }
+    }
+
+    /// Draws what the camera sees into the G-buffer; the number of objects that it may see.
+    pub(crate) fn encode_gbuffer(
+        &self,
+        scope: &mut Scope<'_>,
+        targets: &Targets,
+        geometry: &Geometry,
+        sees: impl Fn(Vec3, f32) -> bool,
+    ) -> u32 {
+        let group = pipelines::bind(scope.gpu, &self.gbuffer.get_bind_group_layout(0), &[whole(scope.frame)]);
+        let edge = scope.alone("G-buffer");
+        let nothing = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let far = wgpu::LoadOp::Clear(0.0);
+        let mut pass =
+            scope.render_pass(edge, Some((&targets.gbuffer.view, nothing)), Some((&targets.depth.view, far)));
+        pass.set_pipeline(&self.gbuffer);
+        pass.set_bind_group(0, &group, &[]);
+        geometry.draw(&mut pass, 0..1, sees)
+    }
+
+    /// Irradiance straight from the lights, with shadow maps or without shadows.
+    pub(crate) fn encode_direct(
+        &mut self,
+        scope: &mut Scope<'_>,
+        targets: &Targets,
+        maps: &ShadowMaps,
+        kind: DirectKind,
+    ) {
+        if self.direct.as_ref().is_none_or(|(k, _)| *k != kind) {
+            let constants = [
+                ("DELTA_LIGHTS", f64::from(kind.delta_lights)),
+                ("AREA_LIGHTS", f64::from(kind.area_lights)),
+                ("SHADOWS", f64::from(kind.shadows)),
+            ];
+            self.direct =
+                Some((kind, pipelines::covering(scope.gpu, &shader::DIRECT, "arrive", HDR, &constants)));
+        }
+        let Some((_, pipeline)) = &self.direct else { return };
+        let resources = [
+            whole(scope.frame),
+            texture(&targets.gbuffer.view),
+            whole(&maps.lights),
+            whole(&maps.views),
+            texture(&maps.maps),
+            Some(wgpu::BindingResource::Sampler(&maps.sampler)),
+        ];
+        let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
+        let edge = scope.alone("direct light");
+        scope.cover(edge, pipeline, &group, &targets.direct.view);
+    }
+
+    /// The layer that the frame uniform asks for.
+    pub(crate) fn encode_composite(&self, scope: &mut Scope<'_>, targets: &Targets, shown: &Shown<'_>) {
+        let resources = [
+            whole(scope.frame),
+            texture(&targets.gbuffer.view),
+            whole(shown.objects),
+            texture(&targets.direct.view),
+            texture(shown.indirect),
+            texture(shown.openness.unwrap_or(&self.open.view)),
+            texture(shown.owners.unwrap_or(&self.nobody.view)),
+            whole(shown.colours),
+            whole(shown.tallies),
+        ];
+        let group = pipelines::bind(scope.gpu, &self.composite.get_bind_group_layout(0), &resources);
+        let edge = scope.alone("composite");
+        scope.cover(edge, &self.composite, &group, &targets.output.view);
+    }
+}
+
+/// A test against reversed depth.
+pub(crate) fn depth_test(write: bool, compare: wgpu::CompareFunction) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(write),
+        depth_compare: Some(compare),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    }
+}

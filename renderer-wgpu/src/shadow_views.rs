@@ -1,0 +1,253 @@
+//! Turns lights into the table that shaders read, and into the views from which their shadow maps are drawn.
+
+use crate::layout::{AREA_FACES, LightUniform, MAP_SEED, ShadowView};
+use glam::{Mat4, Vec3, Vec4};
+use photonstream_scene::SceneLight;
+use photonstream_shading::{
+    LightShape, basis, light::Bounds, sobol::Sequence, surface::RELATIVE_OFFSET, wgsl,
+};
+
+/// Most shadow maps of a scene: layers of one texture.
+pub(crate) const MAX_MAPS: u32 = 256;
+
+/// What shaders know of a scene's lights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct LightTable {
+    pub(crate) lights: Vec<LightUniform>,
+    pub(crate) views: Vec<ShadowView>,
+    /// Edge of each map in texels; 0 without maps.
+    pub(crate) resolution: u32,
+    /// Lights for which there was no map left: they shine through everything.
+    pub(crate) unshadowed: u32,
+}
+
+impl LightTable {
+    /// The table of `lights`; area lights have maps around up to `points` of their points.
+    pub(crate) fn new(lights: &[SceneLight], bounds: Bounds, points: u32, with_maps: bool) -> Self {
+        let shapes = || lights.iter().map(|l| &l.light.shape);
+        let wanted = |points| shapes().map(|s| maps_of(s, points)).sum::<u32>();
+        // Fewer points for each area light until all lights have maps.
+        let mut points = points.clamp(1, 16);
+        while points > 1 && wanted(points) > MAX_MAPS {
+            points /= 2;
+        }
+        let mut table = Self::default();
+        let total = wanted(points).min(MAX_MAPS);
+        table.resolution = match total {
+            0 => 0,
+            1..=12 => 1024,
+            13..=48 => 512,
+            _ => 256,
+        };
+        for (index, light) in lights.iter().enumerate() {
+            let shape = &light.light.shape;
+            let maps = maps_of(shape, points);
+            let first_map = table.views.len() as u32;
+            let fits = with_maps && first_map + maps <= MAX_MAPS;
+            if with_maps && !fits {
+                table.unshadowed += 1;
+            }
+            let maps = if fits { maps } else { 0 };
+            let mut entry = light_uniform(shape, light.light.power);
+            (entry.first_map, entry.maps, entry.map_points) = (first_map, maps, points);
+            if maps > 0 {
+                let sample = |k: u32| Sequence::new(MAP_SEED.into(), index as u32).sample(k.into()).next_2d();
+                views(shape, &entry, bounds, table.resolution, points, sample, &mut table.views);
+            }
+            table.lights.push(entry);
+        }
+        if table.views.is_empty() {
+            table.resolution = 0;
+        }
+        table
+    }
+}
+
+/// Half angle (as its cosine) up to which a spot has one map; wider ones have a cube.
+const SINGLE_MAP_COS: f32 = 0.35;
+
+fn maps_of(shape: &LightShape, points: u32) -> u32 {
+    match *shape {
+        LightShape::Point { .. } => 6,
+        LightShape::Spot { versine_outer, .. } => {
+            if 1.0 - versine_outer > SINGLE_MAP_COS {
+                1
+            } else {
+                6
+            }
+        }
+        LightShape::Directional { .. } => 1,
+        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => AREA_FACES * points,
+    }
+}
+
+/// The light as shaders read it, without maps.
+pub(crate) fn light_uniform(shape: &LightShape, power: Vec3) -> LightUniform {
+    let mut entry =
+        LightUniform { kind: wgsl::light_kind(shape), power: power.to_array(), ..Default::default() };
+    match *shape {
+        LightShape::Point { position } => entry.position = position.to_array(),
+        LightShape::Spot { position, direction, versine_inner, versine_outer } => {
+            entry.position = position.to_array();
+            entry.direction = direction.to_array();
+            (entry.versine_inner, entry.versine_outer) = (versine_inner, versine_outer);
+        }
+        LightShape::Directional { direction } => entry.direction = direction.to_array(),
+        LightShape::Parallelogram { corner, edge_u, edge_v }
+        | LightShape::Triangle { corner, edge_u, edge_v } => {
+            entry.position = corner.to_array();
+            entry.direction = shape.emitter_normal().to_array();
+            entry.edge_u = edge_u.to_array();
+            entry.edge_v = edge_v.to_array();
+            let corners = [corner, corner + edge_u, corner + edge_v];
+            let magnitude = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);
+            entry.emitter_offset = magnitude * RELATIVE_OFFSET;
+        }
+    }
+    entry
+}
+
+/// Where a view stands and how it is turned.
+struct Frame {
+    position: Vec3,
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+}
+
+fn views(
+    shape: &LightShape,
+    entry: &LightUniform,
+    bounds: Bounds,
+    resolution: u32,
+    points: u32,
+    sample: impl Fn(u32) -> [f32; 2],
+    out: &mut Vec<ShadowView>,
+) {
+    // The filter reaches two texels beyond an edge.
+    let margin = 1.0 + 4.0 / resolution as f32;
+    let near = bounds.radius.max(f32::MIN_POSITIVE) * 1e-4;
+    match *shape {
+        LightShape::Directional { direction } => {
+            let (right, up) = basis::tangents(direction);
+            out.push(parallel_view(
+                &Frame { position: bounds.centre, right, up, forward: direction },
+                bounds.radius * margin,
+                resolution,
+            ));
+        }
+        LightShape::Spot { position, direction, versine_outer, .. } if entry.maps == 1 => {
+            let cos = 1.0 - versine_outer;
+            let tan = (versine_outer * (2.0 - versine_outer)).sqrt() / cos;
+            let (right, up) = basis::tangents(direction);
+            out.push(perspective_view(
+                &Frame { position, right, up, forward: direction },
+                tan * margin,
+                near,
+                resolution,
+            ));
+        }
+        LightShape::Point { position } | LightShape::Spot { position, .. } => {
+            let frame = Frame { position, right: Vec3::X, up: Vec3::Y, forward: Vec3::Z };
+            out.extend(faces(&frame).iter().map(|f| perspective_view(f, margin, near, resolution)));
+        }
+        LightShape::Parallelogram { corner, edge_u, edge_v }
+        | LightShape::Triangle { corner, edge_u, edge_v } => {
+            let normal = shape.emitter_normal();
+            let across = edge_u.normalize_or(Vec3::X);
+            for k in 0..points {
+                let u = sample(k);
+                let [a, b] = match shape {
+                    LightShape::Triangle { .. } => photonstream_shading::sampling::triangle(u),
+                    _ => u,
+                };
+                let position = corner + edge_u * a + edge_v * b + normal * entry.emitter_offset;
+                let frame = Frame { position, right: across, up: normal.cross(across), forward: normal };
+                // All faces but the one behind the emitter.
+                let [right, left, above, below, ahead, _] = faces(&frame);
+                out.extend(
+                    [right, left, above, below, ahead]
+                        .iter()
+                        .map(|f| perspective_view(f, margin, near, resolution)),
+                );
+            }
+        }
+    }
+}
+
+/// The faces of a cube in the directions of a frame: right, left, up, down, forward, back.
+fn faces(frame: &Frame) -> [Frame; 6] {
+    let (position, r, u, f) = (frame.position, frame.right, frame.up, frame.forward);
+    [(r, u, f), (-r, u, f), (u, f, r), (-u, f, r), (f, r, u), (-f, r, u)].map(|(forward, right, up)| Frame {
+        position,
+        right,
+        up,
+        forward,
+    })
+}
+
+fn perspective_view(frame: &Frame, tan: f32, near: f32, resolution: u32) -> ShadowView {
+    let row = |v: Vec3| v.extend(-v.dot(frame.position));
+    // Reversed depth near/w.
+    let rows =
+        [row(frame.right) / tan, row(frame.up) / tan, Vec4::new(0.0, 0.0, 0.0, near), row(frame.forward)];
+    view(rows, 2.0 * tan / resolution as f32, false)
+}
+
+fn parallel_view(frame: &Frame, radius: f32, resolution: u32) -> ShadowView {
+    let row = |v: Vec3| v.extend(-v.dot(frame.position)) / radius;
+    let depth = Vec4::new(0.0, 0.0, 0.0, 0.5) - row(frame.forward) * 0.5;
+    let rows = [row(frame.right), row(frame.up), depth, Vec4::new(0.0, 0.0, 0.0, 1.0)];
+    view(rows, 2.0 * radius / resolution as f32, true)
+}
+
+fn view(rows: [Vec4; 4], texel: f32, parallel: bool) -> ShadowView {
+    let matrix = Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
+    ShadowView {
+        clip_from_world: matrix.to_cols_array_2d(),
+        texel,
+        parallel: parallel.into(),
+        pad_0: 0,
+        pad_1: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(view: &ShadowView, p: Vec3) -> Vec3 {
+        let clip = Mat4::from_cols_array_2d(&view.clip_from_world) * p.extend(1.0);
+        clip.truncate() / clip.w
+    }
+
+    /// Points around a light are in the middle of the face that shaders choose for them, nearer ones deeper.
+    #[test]
+    fn faces_look_along_their_axes() {
+        let frame =
+            Frame { position: Vec3::new(1.0, 2.0, 3.0), right: Vec3::X, up: Vec3::Y, forward: Vec3::Z };
+        let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+        for (face, axis) in faces(&frame).iter().zip(axes) {
+            let view = perspective_view(face, 1.0, 1e-3, 256);
+            let near = seen(&view, frame.position + axis * 0.5);
+            let far = seen(&view, frame.position + axis * 2.0);
+            assert!(near.truncate().length() < 1e-6 && far.truncate().length() < 1e-6, "{axis}");
+            assert!(near.z > far.z && far.z > 0.0 && near.z < 1.0);
+            let corner = seen(&view, frame.position + axis + face.right + face.up);
+            assert!((corner.truncate() - glam::Vec2::ONE).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_sun_sees_the_whole_scene() {
+        let direction = Vec3::new(0.6, -0.8, 0.0);
+        let (right, up) = basis::tangents(direction);
+        let centre = Vec3::new(3.0, 1.0, -2.0);
+        let view = parallel_view(&Frame { position: centre, right, up, forward: direction }, 5.0, 1024);
+        for offset in [direction, -direction, right, up, -right] {
+            let p = seen(&view, centre + offset * 5.0);
+            assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (-1e-6..=1.000_001).contains(&p.z), "{p}");
+        }
+        assert!(seen(&view, centre - direction * 4.0).z > seen(&view, centre + direction * 4.0).z);
+    }
+}

@@ -1,0 +1,89 @@
+//! Turns command-line arguments into what the window shows first; shared by its own program and the launcher.
+
+use photonstream_protocol::ChannelName;
+use photonstream_renderer::{LayerKind, cli::Size};
+use photonstream_renderer_wgpu::{Accumulation, AdapterChoice, Shadows};
+use photonstream_scene::Visibility;
+use photonstream_shading::Kernel;
+use std::path::PathBuf;
+
+/// Arguments of a window on a channel.
+#[derive(clap::Args, Clone, Debug, PartialEq)]
+pub struct Args {
+    /// Channel of the simulator.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    pub channel: ChannelName,
+    /// Folder for screenshots: screenshot-0001.exr, screenshot-0001.png …
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// Size of the window's picture in pixels, such as 800x600; the scene's own if not given.
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Graphics adapter: a part of its name; the most capable one if not given.
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Draw in software, on the CPU.
+    #[arg(long)]
+    pub software: bool,
+    /// End after having shown so many published frames.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// How light falls off at first: paper or disc; the scene's own if not given.
+    #[arg(long, value_name = "K")]
+    pub kernel: Option<Kernel>,
+    /// Shadows of indirect light at first: none, ao or rays; the scene's own if not given.
+    #[arg(long, value_name = "V")]
+    pub visibility: Option<Visibility>,
+    /// How virtual surface lights are summed at first: forward, splat or tiled.
+    #[arg(long, value_name = "A")]
+    pub accumulation: Option<Accumulation>,
+    /// How lights are shadowed at first: maps, rays or none.
+    #[arg(long, value_name = "S")]
+    pub shadows: Option<Shadows>,
+    /// What is shown at first: full, direct, indirect, albedo, normal, vsl, flux, depth.
+    #[arg(long, value_name = "LAYER", default_value = "full")]
+    pub show: LayerKind,
+    /// Fault injection: the graphics device is destroyed once, after so many pictures.
+    #[arg(long, value_name = "N", hide = true)]
+    pub lose_device_after: Option<u64>,
+}
+
+impl Args {
+    /// Which adapter to take.
+    pub fn adapter_choice(&self) -> AdapterChoice {
+        AdapterChoice { name: self.adapter.clone(), software: self.software }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn arguments_are_read_and_wrong_ones_say_what_is_expected() {
+        let args = Command::try_parse_from(["w"]).unwrap().args;
+        assert_eq!((args.channel.as_str(), args.show, args.frames), ("default", LayerKind::Full, None));
+        let line = "w --channel a --out x --size 320x200 --adapter llvm --software --frames 3 --kernel paper \
+                    --visibility ao --accumulation splat --shadows rays --show indirect";
+        let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
+        assert_eq!(args.adapter_choice(), AdapterChoice { name: Some("llvm".into()), software: true });
+        assert_eq!(args.size, Some(Size { width: 320, height: 200 }));
+        assert_eq!((args.accumulation, args.shadows), (Some(Accumulation::Splat), Some(Shadows::Rays)));
+        for (line, expected) in [
+            ("w --accumulation til", "forward, splat, tiled"),
+            ("w --shadows soft", "maps, rays, none"),
+            ("w --frames 0", "0 is not in 1.."),
+            ("w --size 5", "such as 800x600"),
+        ] {
+            let Err(error) = Command::try_parse_from(line.split_whitespace()) else { panic!("{line}") };
+            assert!(error.to_string().contains(expected), "{error}");
+        }
+    }
+}
