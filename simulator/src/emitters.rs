@@ -19,6 +19,8 @@ pub struct LightSlots {
     pub birth: Vec3,
     /// Its samples.
     pub sequence: Sequence,
+    /// Watts it emits into the scene per unit of its power.
+    pub watts_per_power: f32,
 }
 
 /// The lights whose deposits are summed together.
@@ -55,11 +57,7 @@ impl Emitters {
         if count == 0 {
             return Self { lights: vec![], columns: vec![], slots: 0 };
         }
-        let watts: Vec<Vec3> = scene
-            .lights
-            .iter()
-            .map(|l| l.light.power * l.light.shape.watts_per_power(scene.bounds))
-            .collect();
+        let watts = watts(scene);
         let total: f64 = watts.iter().map(|&w| f64::from(luminance(w))).sum();
         let equal = 1.0 / count as f64;
         let weights: Vec<f64> =
@@ -73,8 +71,22 @@ impl Emitters {
                     }
                 })
                 .collect();
-        let slots = apportion(&weights, scene.streaming.pool_paths);
+        Self::split(scene, &apportion(&weights, scene.streaming.pool_paths))
+    }
 
+    /// The same split for an edited version of the scene, whatever power its lights have now: slots keep their samples.
+    pub fn with_scene(&self, scene: &Scene) -> Self {
+        let slots: Vec<u32> = self.lights.iter().map(|l| l.slots.end - l.slots.start).collect();
+        Self::split(scene, &slots)
+    }
+
+    /// The emitters of a scene of which each light has the given number of slots.
+    fn split(scene: &Scene, slots: &[u32]) -> Self {
+        let count = scene.lights.len();
+        if count == 0 {
+            return Self { lights: vec![], columns: vec![], slots: 0 };
+        }
+        let watts = watts(scene);
         let own = (scene.streaming.light_columns.max(1) as usize).min(count);
         let shares_last = count > own;
         let mut lights = Vec::with_capacity(count);
@@ -86,6 +98,7 @@ impl Emitters {
                 column: index.min(own - 1) as u32,
                 birth: Vec3::ONE,
                 sequence: Sequence::new(scene.streaming.seed, stream_of(&light.name, 0)),
+                watts_per_power: light.light.shape.watts_per_power(scene.bounds),
             });
             first += slots[index];
         }
@@ -125,4 +138,9 @@ impl Emitters {
             })
             .collect()
     }
+}
+
+/// Watts that each light emits into the scene, linear RGB.
+fn watts(scene: &Scene) -> Vec<Vec3> {
+    scene.lights.iter().map(|l| l.light.power * l.light.shape.watts_per_power(scene.bounds)).collect()
 }

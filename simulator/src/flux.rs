@@ -35,6 +35,15 @@ impl Deposit {
         (rgb != [0; 3]).then_some(Self { vsl, rgb })
     }
 
+    /// The deposit times `factor`, at most [`MAX_THROUGHPUT`]; `None` where it rounds to nothing.
+    pub(crate) fn scaled(&self, factor: Vec3) -> Option<Self> {
+        let [r, g, b] = self.rgb.map(f64::from);
+        let most = f64::from(MAX_THROUGHPUT) / QUANTUM;
+        let quanta = (DVec3::new(r, g, b) * factor.as_dvec3()).round().min(DVec3::splat(most));
+        let rgb = quanta.to_array().map(|q| q as i32);
+        (rgb != [0; 3]).then_some(Self { vsl: self.vsl, rgb })
+    }
+
     /// Square of the mean channel, in quanta of (2⁻¹¹)².
     #[inline]
     fn square(&self) -> i64 {

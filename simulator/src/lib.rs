@@ -13,6 +13,7 @@ pub mod owner;
 pub mod placement;
 pub mod pool;
 pub mod records;
+pub mod revision;
 pub mod service;
 pub mod simulation;
 mod streams;

@@ -7,6 +7,7 @@ use crate::{
     flux::{Deposit, VslFlux},
     tracer::PathBatch,
 };
+use glam::Vec3;
 
 /// Paths in fixed slots, and the flux that they sum to.
 #[derive(Clone, Debug)]
@@ -59,6 +60,22 @@ impl PathPool {
     pub fn remove(&mut self, slot: u32) {
         let run = self.columns.partition_point(|&(end, _)| end <= slot);
         self.take_back(slot, self.columns[run].1);
+    }
+
+    /// Multiplies what the paths in `slots` deposited by `factor`, not negative: they then stand for as much more light.
+    /// Rounded to quanta, and cut at the largest deposit.
+    pub fn scale(&mut self, slots: std::ops::Range<u32>, factor: Vec3) {
+        let mut scaled = Vec::new();
+        for slot in slots {
+            let Slot { start, length, valid, birth_ms } = self.slots[slot as usize];
+            if !valid {
+                continue;
+            }
+            scaled.clear();
+            scaled.extend(self.deposits.get(start, length).iter().filter_map(|d| d.scaled(factor)));
+            let run = self.columns.partition_point(|&(end, _)| end <= slot);
+            self.replace_path(slot, self.columns[run].1, &scaled, birth_ms);
+        }
     }
 
     fn replace_path(&mut self, slot: u32, column: u32, deposits: &[Deposit], birth_ms: u32) {

@@ -7,17 +7,21 @@ use photonstream_shading::LightShape;
 
 /// One record for each virtual surface light: where it is, without its flux.
 pub fn vsl_records(scene: &Scene, placement: &Placement) -> Vec<VslRecord> {
-    placement
+    let mut records: Vec<VslRecord> = placement
         .vsls
         .iter()
-        .map(|vsl| VslRecord {
-            object: vsl.surface.object.0,
-            position: vsl.position_ws(&scene.geometry).to_array(),
-            normal: vsl.normal_ws(&scene.geometry).to_array(),
-            area: vsl.area,
-            ..VslRecord::default()
-        })
-        .collect()
+        .map(|vsl| VslRecord { object: vsl.surface.object.0, area: vsl.area, ..VslRecord::default() })
+        .collect();
+    write_places(&mut records, scene, placement);
+    records
+}
+
+/// Writes where each virtual surface light is in this version of the scene.
+pub fn write_places(records: &mut [VslRecord], scene: &Scene, placement: &Placement) {
+    for (record, vsl) in records.iter_mut().zip(&placement.vsls) {
+        record.position = vsl.position_ws(&scene.geometry).to_array();
+        record.normal = vsl.normal_ws(&scene.geometry).to_array();
+    }
 }
 
 /// Writes flux, standard error and age into the records; `now_ms` counts since the simulation started.
@@ -49,7 +53,7 @@ pub fn light_records(scene: &Scene) -> Vec<LightRecord> {
         .iter()
         .map(|light| {
             let mut record = LightRecord {
-                enabled: 1,
+                enabled: u32::from(light.enabled),
                 power: light.light.power.to_array(),
                 object: light.object.map_or(u32::MAX, |o| o.0),
                 ..LightRecord::default()

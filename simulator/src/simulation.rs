@@ -38,6 +38,20 @@ impl Simulation {
         Self { scene, placement: Arc::new(placement), owners, emitters, tracer }
     }
 
+    /// The same simulation in an edited version of its scene: the virtual surface lights ride with their objects, and the
+    /// pool is split as before, whatever power the lights have now.
+    pub fn with_scene(&self, scene: Arc<Scene>) -> Self {
+        let emitters = Arc::new(self.emitters.with_scene(&scene));
+        let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&self.owners), Arc::clone(&emitters));
+        Self {
+            scene,
+            placement: Arc::clone(&self.placement),
+            owners: Arc::clone(&self.owners),
+            emitters,
+            tracer,
+        }
+    }
+
     /// A ledger with an empty pool.
     pub fn ledger(&self) -> Ledger {
         Ledger::new(&self.scene, Arc::clone(&self.emitters), self.placement.vsls.len())

@@ -2,15 +2,17 @@
 
 use super::{
     Farewell,
-    ledger_actor::{Change, LedgerActor, ToLedger},
-    publisher_actor::{PublisherActor, RECORD_SETS, Still},
+    edits::Edits,
+    ledger_actor::{Change, LedgerActor, ToLedger, Version},
+    publisher_actor::{PlacedRecords, PublisherActor, RECORD_SETS, Still},
     spawn, tracer_actor,
 };
 use crate::{counters::Counters, error::SimulatorError, records, simulation::Simulation};
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
-    ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, SegmentSpec,
+    ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, SegmentSpec, monotonic_ns,
 };
+use photonstream_scene::Scene;
 use serde::Serialize;
 use std::{
     sync::{
@@ -67,7 +69,7 @@ pub fn run(
     options: &Options,
     stop: &flume::Receiver<()>,
 ) -> Result<Summary, SimulatorError> {
-    let director = Director::start(simulation, options)?;
+    let mut director = Director::start(simulation, options)?;
     let ending = director.direct(stop);
     director.end(ending)
 }
@@ -80,6 +82,9 @@ enum Event {
 
 struct Director {
     scene_name: String,
+    /// The newest version.
+    simulation: Simulation,
+    still: Arc<Still>,
     started: Instant,
     server: ControlServer,
     to_ledger: flume::Sender<ToLedger>,
@@ -100,13 +105,10 @@ impl Director {
             .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
             .max(1);
         let place = records::vsl_records(&scene, &simulation.placement);
-        let still = Still {
-            objects: records::object_records(&scene),
-            lights: records::light_records(&scene),
-            scene_text: Arc::clone(&scene.resolved_text),
-        };
+        let place = PlacedRecords { records: place, version: 0 };
+        let still = Arc::new(Still::new(&scene));
         let spec = SegmentSpec {
-            vsl_capacity: place.len().max(1) as u32,
+            vsl_capacity: place.records.len().max(1) as u32,
             object_capacity: still.objects.len().max(1) as u32,
             light_capacity: still.lights.len().max(1) as u32,
             scene_text_capacity: still.scene_text.len() as u32,
@@ -138,7 +140,6 @@ impl Director {
         let orderly = Arc::new(AtomicBool::new(false));
         let actor = PublisherActor {
             publisher,
-            still,
             snapshots,
             emptied: Arc::clone(&emptied),
             latest_frame: Arc::clone(&latest_frame),
@@ -152,7 +153,8 @@ impl Director {
             })?
         };
         let actor = LedgerActor {
-            simulation,
+            simulation: simulation.clone(),
+            still: Arc::clone(&still),
             threads,
             inbox,
             work: work_sender,
@@ -169,6 +171,8 @@ impl Director {
         };
         Ok(Self {
             scene_name: scene.name.clone(),
+            simulation,
+            still,
             started: Instant::now(),
             server,
             to_ledger,
@@ -182,7 +186,7 @@ impl Director {
     }
 
     /// Until it is time to end; `None` if an actor ended before.
-    fn direct(&self, stop: &flume::Receiver<()>) -> Option<Ending> {
+    fn direct(&mut self, stop: &flume::Receiver<()>) -> Option<Ending> {
         loop {
             let event = flume::Selector::new()
                 .recv(stop, |_| Event::Stop)
@@ -193,7 +197,8 @@ impl Director {
                 Event::Stop => return Some(Ending::Stopped),
                 // An actor ended before its time; `end` finds out which, and why.
                 Event::ActorGone => return None,
-                Event::Request(Incoming { request, replier, .. }) => {
+                Event::Request(incoming) => {
+                    let Some(Incoming { request, replier, .. }) = self.edit(incoming) else { continue };
                     let ends = matches!(request, Request::Shutdown);
                     let reply = self.answer(request);
                     replier.reply(reply);
@@ -216,16 +221,38 @@ impl Director {
                 Some(Err(error)) => Reply::error("internal", error.to_string()),
                 None => Self::busy(),
             },
-            other => {
-                let name = format!("{other:?}");
-                let name = name.split([' ', '{', '(']).next().unwrap_or_default().to_owned();
-                Reply::error(
-                    "unsupported",
-                    format!(
-                        "this simulator cannot change a running scene yet ({name}); restart it with the edited config"
-                    ),
-                )
+            Request::Reload | Request::SetStreaming { .. } => Reply::error(
+                "unsupported",
+                "this simulator cannot load another config yet; restart it with the edited one",
+            ),
+            Request::Hello { .. } | Request::SetLight { .. } | Request::MoveObject { .. } => {
+                Reply::error("internal", "the request should have been answered before")
             }
+        }
+    }
+
+    /// Applies an edit, together with all edits that wait behind it, as one new version of the scene. Returns the request
+    /// that follows them, if it is no edit.
+    fn edit(&mut self, incoming: Incoming) -> Option<Incoming> {
+        let received_ns = monotonic_ns();
+        let mut edits = Edits::of(&self.simulation.scene);
+        let rest = edits.take(incoming, self.server.requests());
+        if let Some((scene, repliers)) = edits.finish() {
+            let reply = self.show(scene, received_ns);
+            repliers.into_iter().for_each(|replier| replier.reply(reply.clone()));
+        }
+        rest
+    }
+
+    /// Makes `scene` the version that is simulated and shown.
+    fn show(&mut self, scene: Scene, received_ns: u64) -> Reply {
+        self.still = Arc::new(self.still.next(&scene));
+        self.simulation = self.simulation.with_scene(Arc::new(scene));
+        let version =
+            Version { simulation: self.simulation.clone(), still: Arc::clone(&self.still), received_ns };
+        match self.ask(|sender| ToLedger::Edit(Box::new(version), sender)) {
+            Some(frame) => Reply::Ok { frame },
+            None => Self::busy(),
         }
     }
 

@@ -1,15 +1,19 @@
 //! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
 
-use super::{publisher_actor::Snapshot, tracer_actor::Work};
+use super::{
+    publisher_actor::{PlacedRecords, Snapshot, Still},
+    tracer_actor::Work,
+};
 use crate::{
     counters::Counters,
     ledger::{Ledger, Task},
     records,
+    revision::revisions,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
 };
 use crossbeam::queue::ArrayQueue;
-use photonstream_protocol::{StatisticsRecord, VslRecord, monotonic_ns};
+use photonstream_protocol::{StatisticsRecord, monotonic_ns};
 use serde::Serialize;
 use std::{
     sync::Arc,
@@ -22,10 +26,20 @@ pub(super) enum ToLedger {
     Finished { task: Task, batch: PathBatch },
     /// Change what is done; the answer is the number of the first frame that shows it.
     Change(Change, flume::Sender<u64>),
+    /// Go on in a new version of the scene; the answer is the number of the first frame that shows it.
+    Edit(Box<Version>, flume::Sender<u64>),
     /// Tell the present state.
     Query(flume::Sender<State>),
     /// End.
     Stop,
+}
+
+/// A new version of the scene.
+pub(super) struct Version {
+    pub(super) simulation: Simulation,
+    pub(super) still: Arc<Still>,
+    /// When the edit arrived, monotonic ns.
+    pub(super) received_ns: u64,
 }
 
 /// What the ledger can be told to do.
@@ -56,6 +70,8 @@ pub struct State {
     pub pool_paths: u32,
     /// Slots that hold a path.
     pub pool_valid: u32,
+    /// Share of the pool that stands for the scene before the last edit.
+    pub stale_share: f64,
     /// Tracer threads.
     pub threads: usize,
     /// Paths traced a second, over the time in which there was work.
@@ -74,19 +90,25 @@ const PUBLISHING_SHARE: u32 = 10;
 
 /// Runs the ledger until it is stopped or everybody it works with is gone.
 pub(super) struct LedgerActor {
+    /// The first version.
     pub(super) simulation: Simulation,
+    pub(super) still: Arc<Still>,
     pub(super) threads: usize,
     pub(super) inbox: flume::Receiver<ToLedger>,
     pub(super) work: flume::Sender<Work>,
     pub(super) snapshots: flume::Sender<Snapshot>,
-    pub(super) emptied: Arc<ArrayQueue<Vec<VslRecord>>>,
+    pub(super) emptied: Arc<ArrayQueue<PlacedRecords>>,
     /// Stop handing out work after this many paths.
     pub(super) after_paths: Option<u64>,
 }
 
 struct Progress {
+    simulation: Simulation,
+    still: Arc<Still>,
     ledger: Ledger,
     tracer: Arc<Tracer>,
+    /// Counts the versions in which objects moved.
+    places: u64,
     spare: Vec<PathBatch>,
     started: Instant,
     paused: bool,
@@ -96,6 +118,7 @@ struct Progress {
     next_frame: Instant,
     /// Snapshots sent, each of which becomes a frame.
     frames: u64,
+    edit_received_ns: u64,
     traced_ns: u64,
     paths_given: u64,
     /// Time in which there was work, and since when there is.
@@ -109,8 +132,11 @@ impl LedgerActor {
             Duration::from_secs_f32(self.simulation.scene.streaming.publish_period_ms.max(0.1) / 1e3);
         let started = Instant::now();
         let mut progress = Progress {
+            simulation: self.simulation.clone(),
+            still: Arc::clone(&self.still),
             ledger: self.simulation.ledger(),
             tracer: Arc::new(self.simulation.tracer.clone()),
+            places: 0,
             spare: Vec::new(),
             started,
             paused: false,
@@ -118,6 +144,7 @@ impl LedgerActor {
             changed: true,
             next_frame: started + period,
             frames: 0,
+            edit_received_ns: 0,
             traced_ns: 0,
             paths_given: 0,
             active: Duration::ZERO,
@@ -160,11 +187,13 @@ impl LedgerActor {
     /// Keeps the tracers busy. False if there are none any more.
     fn hand_out(&self, progress: &mut Progress) -> bool {
         let most = 2 * self.threads as u64 + 2;
-        while progress.ledger.in_flight() < most
-            && (!progress.paused || progress.stepping)
-            && self.after_paths.is_none_or(|limit| progress.paths_given < limit)
-        {
-            let Some(task) = progress.ledger.next_task() else { break };
+        while progress.ledger.in_flight() < most && (!progress.paused || progress.stepping) {
+            // An edit is followed to its end, whatever the limit.
+            let task = match self.is_at_limit(progress) {
+                true => progress.ledger.next_stale_task(),
+                false => progress.ledger.next_task(),
+            };
+            let Some(task) = task else { break };
             progress.paths_given += u64::from(task.count);
             let batch = progress.spare.pop().unwrap_or_default();
             let tracer = Arc::clone(&progress.tracer);
@@ -175,9 +204,14 @@ impl LedgerActor {
         true
     }
 
+    fn is_at_limit(&self, progress: &Progress) -> bool {
+        self.after_paths.is_some_and(|limit| progress.paths_given >= limit)
+    }
+
     fn is_done(&self, progress: &Progress) -> bool {
-        let limited = self.after_paths.is_some_and(|limit| progress.paths_given >= limit);
-        progress.ledger.is_done() || (limited && progress.ledger.in_flight() == 0)
+        let ledger = &progress.ledger;
+        let rests = self.is_at_limit(progress) && ledger.in_flight() == 0 && ledger.stale_paths() == 0;
+        ledger.is_done() || rests
     }
 
     /// False where it is time to end.
@@ -200,6 +234,10 @@ impl LedgerActor {
                 progress.changed = true;
                 let _ = reply.send(progress.frames + 1);
             }
+            ToLedger::Edit(version, reply) => {
+                progress.edit(*version);
+                let _ = reply.send(progress.frames + 1);
+            }
             ToLedger::Query(reply) => {
                 // Whoever asked may have gone.
                 let _ = reply.send(self.state(progress));
@@ -212,10 +250,15 @@ impl LedgerActor {
     fn publish(&self, progress: &mut Progress, converged: bool, period: Duration) -> Published {
         let Some(mut vsls) = self.emptied.pop() else { return Published::Later };
         let begun = Instant::now();
-        let scene = &self.simulation.scene;
-        records::write_flux(&mut vsls, progress.ledger.readings(scene), progress.now_ms());
+        let scene = &progress.simulation.scene;
+        if vsls.version != progress.places {
+            vsls.version = progress.places;
+            records::write_places(&mut vsls.records, scene, &progress.simulation.placement);
+        }
+        records::write_flux(&mut vsls.records, progress.ledger.readings(scene), progress.now_ms());
+        let still = Arc::clone(&progress.still);
         let statistics = self.statistics(progress, converged || progress.ledger.is_converged());
-        let snapshot = Snapshot { vsls, statistics, paused: progress.paused };
+        let snapshot = Snapshot { vsls, still, statistics, paused: progress.paused };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }
@@ -228,7 +271,8 @@ impl LedgerActor {
     }
 
     fn statistics(&self, progress: &Progress, converged: bool) -> StatisticsRecord {
-        let scene = &self.simulation.scene;
+        let scene = &progress.simulation.scene;
+        let slots = progress.ledger.pool().slots();
         let counters = progress.ledger.counters();
         let seconds = progress.active_time(Instant::now()).as_secs_f64().max(1e-6);
         let uptime = progress.started.elapsed().as_secs_f64();
@@ -237,11 +281,13 @@ impl LedgerActor {
             paths_per_s: counters.paths as f64 / seconds,
             rays_per_s: counters.rays as f64 / seconds,
             deposits_per_s: counters.deposits as f64 / seconds,
-            pool_paths: u64::from(progress.ledger.pool().slots()),
+            stale_share: f64::from(progress.ledger.stale_paths()) / f64::from(slots.max(1)),
+            pool_paths: u64::from(slots),
             pool_valid: progress.ledger.pool().valid().iter().map(|&v| u64::from(v)).sum(),
             converged: u64::from(converged),
             simulation_time_s: uptime,
             threads: self.threads as u64,
+            edit_received_ns: progress.edit_received_ns,
             traced_ns: progress.traced_ns,
             ..StatisticsRecord::default()
         };
@@ -260,6 +306,7 @@ impl LedgerActor {
             vsls: self.simulation.placement.vsls.len(),
             pool_paths: statistics.pool_paths as u32,
             pool_valid: statistics.pool_valid as u32,
+            stale_share: statistics.stale_share,
             threads: self.threads,
             paths_per_s: statistics.paths_per_s,
             rays_per_s: statistics.rays_per_s,
@@ -270,6 +317,21 @@ impl LedgerActor {
 }
 
 impl Progress {
+    /// Goes on in a new version of the scene. Batches under way stay those of the old one.
+    fn edit(&mut self, version: Version) {
+        let Version { simulation, still, received_ns } = version;
+        self.places += u64::from(!Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry));
+        let revisions = revisions(&self.simulation, &simulation);
+        self.ledger.revise(Arc::clone(&simulation.emitters), &revisions);
+        self.tracer = Arc::new(simulation.tracer.clone());
+        self.simulation = simulation;
+        self.still = still;
+        self.edit_received_ns = received_ns;
+        // An edit that needs no ray is traced with its arrival.
+        self.traced_ns = monotonic_ns();
+        self.changed = true;
+    }
+
     fn now_ms(&self) -> u32 {
         u32::try_from(self.started.elapsed().as_millis()).unwrap_or(u32::MAX)
     }

@@ -6,11 +6,12 @@
 //!                                  └────→ publisher ─→ shared memory
 //! ```
 //!
-//! The director decides, the ledger alone writes pool and flux, tracers have no state, the publisher alone writes shared
+//! The director decides, and turns edits into new versions of the scene, the ledger alone writes pool and flux, tracers have no state, the publisher alone writes shared
 //! memory. All channels are bounded: who is slow slows down who feeds it. When nothing is left to trace every thread
 //! sleeps.
 
 mod director;
+mod edits;
 mod ledger_actor;
 mod publisher_actor;
 mod tracer_actor;

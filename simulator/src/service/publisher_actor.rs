@@ -1,9 +1,11 @@
 //! Turns snapshots of the ledger into frames in shared memory.
 
+use crate::records;
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
     FrameSource, LightRecord, ObjectRecord, ProtocolError, Publisher, StatisticsRecord, VslRecord,
 };
+use photonstream_scene::Scene;
 use std::{
     sync::{
         Arc,
@@ -14,16 +16,49 @@ use std::{
 
 /// What the ledger wants published.
 pub(super) struct Snapshot {
-    pub(super) vsls: Vec<VslRecord>,
+    pub(super) vsls: PlacedRecords,
+    pub(super) still: Arc<Still>,
     pub(super) statistics: StatisticsRecord,
     pub(super) paused: bool,
 }
 
-/// What stays the same from frame to frame.
+/// Records of all virtual surface lights, and the version of the scene that their places are from.
+#[derive(Clone, Debug)]
+pub(super) struct PlacedRecords {
+    pub(super) records: Vec<VslRecord>,
+    pub(super) version: u64,
+}
+
+/// What stays the same from frame to frame of one version of the scene.
 pub(super) struct Still {
     pub(super) objects: Vec<ObjectRecord>,
     pub(super) lights: Vec<LightRecord>,
     pub(super) scene_text: Arc<str>,
+}
+
+impl Still {
+    /// The records of a scene's first version.
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            objects: records::object_records(scene),
+            lights: records::light_records(scene),
+            scene_text: Arc::clone(&scene.resolved_text),
+        }
+    }
+
+    /// The records of the next version; those that change count their generation up.
+    pub(super) fn next(&self, scene: &Scene) -> Self {
+        let mut next = Self::new(scene);
+        for (new, old) in next.objects.iter_mut().zip(&self.objects) {
+            new.generation = old.generation;
+            new.generation += u32::from(new != old);
+        }
+        for (new, old) in next.lights.iter_mut().zip(&self.lights) {
+            new.generation = old.generation;
+            new.generation += u32::from(new != old);
+        }
+        next
+    }
 }
 
 /// Sets of records that go round between ledger and publisher: one is filled, one is published, and the last one
@@ -36,10 +71,9 @@ const LOOK: Duration = Duration::from_secs(1);
 /// Publishes what the ledger sends, and owns the channel.
 pub(super) struct PublisherActor {
     pub(super) publisher: Publisher,
-    pub(super) still: Still,
     pub(super) snapshots: flume::Receiver<Snapshot>,
     /// Records that the ledger may fill again.
-    pub(super) emptied: Arc<ArrayQueue<Vec<VslRecord>>>,
+    pub(super) emptied: Arc<ArrayQueue<PlacedRecords>>,
     pub(super) latest_frame: Arc<AtomicU64>,
     /// Set before an orderly end; without it the channel is left as a crash leaves it, so that renderers wait for the
     /// simulator to come back instead of taking a half-lit frame for the last.
@@ -88,12 +122,12 @@ impl PublisherActor {
 
     fn publish(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
         let frame = self.publisher.publish(&FrameSource {
-            vsls: &snapshot.vsls,
+            vsls: &snapshot.vsls.records,
             changed: None,
-            objects: &self.still.objects,
-            lights: &self.still.lights,
+            objects: &snapshot.still.objects,
+            lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
-            scene_text: &self.still.scene_text,
+            scene_text: &snapshot.still.scene_text,
             config_generation: 1,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;

@@ -1,7 +1,9 @@
 //! Tests of the simulator through its public interface.
 
 mod closed_forms;
+mod edits;
 mod exactness;
 mod placed;
 mod service;
+mod service_edits;
 mod support;

@@ -11,15 +11,20 @@ use photonstream_simulator::{
 };
 use std::{sync::Arc, thread::JoinHandle, time::Duration};
 
-struct Service {
-    channel: ChannelName,
+pub(crate) struct Service {
+    pub(crate) channel: ChannelName,
     stop: flume::Sender<()>,
     thread: JoinHandle<Summary>,
 }
 
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-fn start(name: &str, simulation: &Simulation, threads: usize, after_paths: Option<u64>) -> Service {
+pub(crate) fn start(
+    name: &str,
+    simulation: &Simulation,
+    threads: usize,
+    after_paths: Option<u64>,
+) -> Service {
     let channel: ChannelName = format!("t{}-{name}", std::process::id()).parse().unwrap();
     let (stop, stopped) = flume::bounded(1);
     let options = Options { channel: channel.clone(), threads: Some(threads), after_paths };
@@ -29,16 +34,24 @@ fn start(name: &str, simulation: &Simulation, threads: usize, after_paths: Optio
 }
 
 impl Service {
-    fn attach(&self) -> Subscriber {
+    pub(crate) fn attach(&self) -> Subscriber {
         Subscriber::attach_wait(&self.channel, AccessMode::Mapped, PATIENCE, &|| false).unwrap()
     }
 
-    fn connect(&self) -> ControlClient {
+    pub(crate) fn connect(&self) -> ControlClient {
         drop(self.attach());
-        ControlClient::connect(&self.channel).unwrap()
+        // The socket follows the segment.
+        let deadline = std::time::Instant::now() + PATIENCE;
+        loop {
+            match ControlClient::connect(&self.channel) {
+                Ok(client) => return client,
+                Err(error) => assert!(std::time::Instant::now() < deadline, "{error}"),
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
-    fn end(self) -> Summary {
+    pub(crate) fn end(self) -> Summary {
         self.stop.send(()).unwrap();
         let summary = self.thread.join().unwrap();
         photonstream_protocol::clean_one(&self.channel).unwrap();
