@@ -5,6 +5,7 @@
 //! `commands` has a file for each, `supervise` keeps child processes alive.
 #![forbid(unsafe_code)]
 
+mod backend;
 mod cli;
 mod commands;
 mod error;

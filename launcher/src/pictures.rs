@@ -4,9 +4,8 @@ use crate::{error::LauncherError, progress::Share};
 use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
-    LayerKind, RenderOptions, RenderStats, VslSet, Watch, cli::Size, published::PublishedScene,
+    FrameRenderer, LayerKind, RenderOptions, RenderStats, Watch, cli::Size, published::PublishedScene,
 };
-use photonstream_renderer_cpu::render;
 use photonstream_scene::{RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 use std::{
@@ -24,7 +23,7 @@ pub(crate) struct Look {
     /// How a light's flux falls off: `disc` (bounded) or `paper` (1/πr²) [default: as the scene says]
     #[arg(long)]
     pub(crate) kernel: Option<Kernel>,
-    /// Shadows of the lights: `rays` or `none` [default: as the scene says]
+    /// Shadows of indirect light: `rays`, `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
     #[arg(long)]
     pub(crate) visibility: Option<Visibility>,
 }
@@ -83,20 +82,20 @@ impl Job<'_> {
     ///
     /// # Errors
     /// Those of the renderer and of the files; cancelled.
-    pub(crate) fn make(&self, frame: &VslFrame) -> Result<Made, LauncherError> {
+    pub(crate) fn make(
+        &self,
+        frame: &VslFrame,
+        renderer: &mut dyn FrameRenderer,
+    ) -> Result<Made, LauncherError> {
         let bar = Share::start("picture");
         let mut published = PublishedScene::default();
         let scene = published.update(frame)?;
-        let vsls = VslSet::from_records(&frame.vsls)?;
         let options = self.look.options(&scene.render, self.layers);
         let progress = |share: f64| bar.set(share);
-        let make = |options: &RenderOptions, outs: &[PathBuf]| -> Result<_, LauncherError> {
+        let mut make = |options: &RenderOptions, outs: &[PathBuf]| -> Result<_, LauncherError> {
             let watch = Watch { progress: Some(&progress), cancelled: Some(self.cancelled) };
-            let rendered = render(scene, &vsls, options, watch)?;
-            let mut film = rendered.film;
-            film.metadata.frame = Some(frame.frame);
-            film.metadata.scene_hash = Some(frame.scene_hash);
-            film.metadata.photon_paths = Some(frame.statistics.pool_valid);
+            let rendered = renderer.render(scene, frame, options, watch)?;
+            let film = rendered.film;
             let mut paths = Vec::new();
             for out in outs {
                 paths.extend(write(&film, out, self.layers, &scene.render)?);

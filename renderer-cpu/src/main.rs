@@ -5,12 +5,8 @@
 #![forbid(unsafe_code)]
 
 use clap::Parser;
-use photonstream_renderer::{attach, cli::Args};
+use photonstream_renderer::{cli::Args, program};
 use photonstream_renderer_cpu::CpuRenderer;
-use std::{
-    io::Write,
-    sync::{Arc, atomic::AtomicBool},
-};
 
 /// Renders what a photonstream simulator publishes, on the CPU.
 #[derive(Parser)]
@@ -22,21 +18,5 @@ struct Command {
 
 fn main() -> anyhow::Result<()> {
     tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).init();
-    let Command { args } = Command::parse();
-    let cancelled = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&cancelled))?;
-    }
-    let report = attach::run(&args, &mut CpuRenderer, &cancelled, &mut |picture| {
-        tracing::info!("frame {} in {:.0} ms", picture.frame, picture.stats.render_ms);
-        for file in picture.files {
-            // A reader of stdout that has gone away does not stop the pictures.
-            let _ = writeln!(std::io::stdout(), "{}", file.display());
-        }
-    })?;
-    anyhow::ensure!(
-        report.pictures > 0 || report.ended != attach::Ended::ChannelClosed,
-        "the channel was closed before a frame was published"
-    );
-    Ok(())
+    Ok(program::run(&Command::parse().args, &mut CpuRenderer)?)
 }

@@ -1,6 +1,7 @@
 //! Turns published virtual surface lights into pictures on the GPU: paper A's deferred renderer, on wgpu.
 #![deny(unsafe_code)]
 
+pub mod cli;
 mod deferred;
 mod error;
 mod gather;
@@ -20,8 +21,7 @@ mod shadow_maps;
 mod shadow_views;
 mod stages;
 mod targets;
-#[cfg(test)]
-mod test_gpu;
+pub mod test_gpu;
 mod timer;
 mod view;
 mod vsl_buffer;

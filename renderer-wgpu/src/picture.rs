@@ -189,9 +189,29 @@ impl FrameRenderer for WgpuRenderer {
         }
         stats.range_loss_share = if indirect_sum > 0.0 { stats.range_loss_share / indirect_sum } else { 0.0 };
         self.warn()?;
+        if self.choices.timed {
+            tracing::info!("{}", times(&self.passes));
+        }
         stats.render_ms = start.elapsed().as_secs_f64() * 1e3;
         let mut rendered = Rendered { film, stats };
         rendered.describe(scene, Some(frame), options);
         Ok(rendered)
     }
+}
+
+/// The passes with their times, those of one name together, and the sum.
+fn times(passes: &[PassTime]) -> String {
+    if passes.is_empty() {
+        return "the device tells no times".into();
+    }
+    let mut named: Vec<PassTime> = Vec::new();
+    for pass in passes {
+        match named.iter_mut().find(|p| p.name == pass.name) {
+            Some(known) => known.ms += pass.ms,
+            None => named.push(*pass),
+        }
+    }
+    let sum: f64 = named.iter().map(|p| p.ms).sum();
+    let list: Vec<_> = named.iter().map(|p| format!("{} {:.2} ms", p.name, p.ms)).collect();
+    format!("{}; together {sum:.2} ms", list.join(", "))
 }

@@ -6,7 +6,7 @@ use crate::{AdapterChoice, Gpu};
 ///
 /// # Panics
 /// If there is none and `PHOTONSTREAM_REQUIRE_GPU` is `1`.
-pub(crate) fn gpu() -> Option<Gpu> {
+pub fn gpu() -> Option<Gpu> {
     match Gpu::headless(&AdapterChoice { name: None, software: true }) {
         Ok(gpu) => Some(gpu),
         Err(error) => {
@@ -20,8 +20,8 @@ pub(crate) fn gpu() -> Option<Gpu> {
 ///
 /// # Panics
 /// If `PHOTONSTREAM_REQUIRE_GPU` is `1`.
-#[allow(clippy::print_stderr)]
-pub(crate) fn skip(reason: &str) {
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+pub fn skip(reason: &str) {
     assert!(
         std::env::var_os("PHOTONSTREAM_REQUIRE_GPU").is_none_or(|value| value != "1"),
         "PHOTONSTREAM_REQUIRE_GPU=1, but {reason}"

@@ -52,14 +52,11 @@ pub enum RenderError {
         /// What is possible.
         expected: &'static str,
     },
-    /// The published scene is not the one that its text describes: an object has moved.
-    #[error(
-        "object \"{object}\" has moved since the scene was published, which this renderer does not follow yet; \
-         restart the simulator to render it in its new place"
-    )]
-    Moved {
-        /// The object's name.
-        object: String,
+    /// A published motion of an object is unusable.
+    #[error("{reason}; simulator and renderer differ, restart both")]
+    Object {
+        /// What is wrong with it.
+        reason: String,
     },
     /// The published scene text could not be loaded.
     #[error("the published scene cannot be loaded: {reason}")]
@@ -70,6 +67,12 @@ pub enum RenderError {
     /// Somebody asked to stop.
     #[error("cancelled")]
     Cancelled,
+    /// The channel was closed before there was anything to show.
+    #[error("channel '{channel}' was closed before a frame was published; start the simulator again")]
+    NoFrame {
+        /// The channel.
+        channel: String,
+    },
     /// What renders has failed: a device is missing or lost, a picture does not fit.
     #[error(transparent)]
     Device(Box<dyn std::error::Error + Send + Sync>),

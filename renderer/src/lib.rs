@@ -10,6 +10,7 @@ mod error;
 mod layer;
 mod options;
 pub mod owner;
+pub mod program;
 pub mod published;
 mod rendered;
 mod vsl;

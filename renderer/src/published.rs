@@ -15,13 +15,16 @@ pub struct PublishedScene {
 }
 
 impl PublishedScene {
-    /// The scene of `frame`, with the frame's lights (which may have been switched, dimmed or moved).
+    /// The scene of `frame`: its text, with objects where the frame has them and with the frame's lights, which may have
+    /// been switched, dimmed or moved. Only what moved since the last frame is built anew.
     ///
     /// # Errors
     /// [`RenderError::Scene`] for a text that cannot be loaded or does not fit the records, [`RenderError::Light`],
-    /// [`RenderError::Moved`] for an object that is no longer where the text puts it.
+    /// [`RenderError::Object`] for a motion that is not rigid. The scene stays that of the last good frame, unless the
+    /// text is another one.
     pub fn update(&mut self, frame: &VslFrame) -> Result<&Scene, RenderError> {
-        let is_known = self.scene.is_some() && self.text.as_deref() == Some(&*frame.scene_text);
+        let is_same = |text: &Arc<str>| Arc::ptr_eq(text, &frame.scene_text) || *text == frame.scene_text;
+        let is_known = self.scene.is_some() && self.text.as_ref().is_some_and(is_same);
         if !is_known {
             self.scene = None;
             let scene = Scene::from_resolved(&frame.scene_text)
@@ -30,24 +33,31 @@ impl PublishedScene {
             self.scene = Some(scene);
         }
         let scene = self.scene.as_mut().expect("invariant: set above");
-        check_objects(scene, &frame.objects)?;
-        set_lights(scene, &frame.lights)?;
+        let lights = lights(scene, &frame.lights)?;
+        place_objects(scene, &frame.objects)?;
+        put_lights(scene, lights);
         Ok(scene)
     }
 }
 
-fn check_objects(scene: &Scene, records: &[ObjectRecord]) -> Result<(), RenderError> {
+/// Moves the objects of `scene` to where the records have them.
+fn place_objects(scene: &mut Scene, records: &[ObjectRecord]) -> Result<(), RenderError> {
+    let mut edit = None;
     for record in records {
         let Some(object) = scene.objects.get(record.id as usize) else {
             let count = scene.objects.len();
             let reason = format!("object {} is published, the text has {count} objects", record.id);
             return Err(RenderError::Scene { reason });
         };
-        let published = DAffine3::from_cols_array(&record.world_from_object);
-        // Both sides come from the same f64 arithmetic; a motion of this size is not visible.
-        if !published.abs_diff_eq(object.world_from_rest, 1e-9 * f64::from(scene.bounds.radius).max(1e-9)) {
-            return Err(RenderError::Moved { object: object.name.clone() });
+        let motion = DAffine3::from_cols_array(&record.world_from_object);
+        if motion != object.world_from_rest {
+            edit.get_or_insert_with(|| scene.edit())
+                .place_object(ObjectId(record.id), motion)
+                .map_err(|e| RenderError::Object { reason: e.to_string() })?;
         }
+    }
+    if let Some(edit) = edit {
+        *scene = edit.finish();
     }
     Ok(())
 }
@@ -57,17 +67,27 @@ fn check_objects(scene: &Scene, records: &[ObjectRecord]) -> Result<(), RenderEr
 /// # Errors
 /// [`RenderError::Scene`] where their number differs, [`RenderError::Light`] for unusable values.
 pub fn set_lights(scene: &mut Scene, records: &[LightRecord]) -> Result<(), RenderError> {
+    let lights = lights(scene, records)?;
+    put_lights(scene, lights);
+    Ok(())
+}
+
+/// A published light: itself, whether it is on, and the object that shows it.
+type Published = (Light, bool, Option<ObjectId>);
+
+fn lights(scene: &Scene, records: &[LightRecord]) -> Result<Vec<Published>, RenderError> {
     if records.len() != scene.lights.len() {
         let reason = format!("{} lights are published, the text has {}", records.len(), scene.lights.len());
         return Err(RenderError::Scene { reason });
     }
-    let lights =
-        records.iter().enumerate().map(|(i, r)| light(i, r)).collect::<Result<Vec<_>, RenderError>>()?;
-    for ((target, light), record) in scene.lights.iter_mut().zip(lights).zip(records) {
-        target.light = light;
-        target.object = (record.object != u32::MAX).then_some(ObjectId(record.object));
+    let object = |record: &LightRecord| (record.object != u32::MAX).then_some(ObjectId(record.object));
+    records.iter().enumerate().map(|(i, r)| Ok((light(i, r)?, r.enabled != 0, object(r)))).collect()
+}
+
+fn put_lights(scene: &mut Scene, lights: Vec<Published>) {
+    for (target, (light, enabled, object)) in scene.lights.iter_mut().zip(lights) {
+        (target.light, target.enabled, target.object) = (light, enabled, object);
     }
-    Ok(())
 }
 
 fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
@@ -119,7 +139,74 @@ fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+    use glam::DVec3;
+
+    const ROOM: &str = "[camera]\nposition_m = [0, 0, 3]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n\
+         [material.a]\nalbedo = 0.5\n\
+         [object.ball]\nmaterial = \"a\"\nsphere = { radius_m = 0.5, segments = 8 }\n\
+         [object.floor]\nmaterial = \"a\"\nquad = { corner_m = [-1, -1, 1], edge_u_m = [2, 0, 0], edge_v_m = [0, 0, -2] }\n\
+         [light.lamp]\npower_w = 3\nrectangle = { corner_m = [0, 1, 0], edge_u_m = [0.5, 0, 0], edge_v_m = [0, 0, 0.5] }\n";
+
+    /// A frame of `scene` as a simulator publishes it.
+    fn frame(scene: &Scene) -> VslFrame {
+        let objects = (0u32..).zip(&scene.objects).map(|(id, object)| ObjectRecord {
+            id,
+            world_from_object: object.world_from_rest.to_cols_array(),
+            ..ObjectRecord::default()
+        });
+        let lights = scene.lights.iter().map(|light| {
+            let LightShape::Parallelogram { corner, edge_u, edge_v } = light.light.shape else { panic!() };
+            LightRecord {
+                kind: 3,
+                enabled: 1,
+                power: light.light.power.to_array(),
+                position: corner.to_array(),
+                edge_u: edge_u.to_array(),
+                edge_v: edge_v.to_array(),
+                object: light.object.unwrap().0,
+                ..LightRecord::default()
+            }
+        });
+        VslFrame {
+            objects: objects.collect(),
+            lights: lights.collect(),
+            scene_text: Arc::clone(&scene.resolved_text),
+            ..VslFrame::default()
+        }
+    }
+
+    #[test]
+    fn moved_objects_are_followed_and_nothing_else_is_built_anew() {
+        let still = Scene::from_resolved(ROOM).unwrap();
+        let mut moved = still.clone();
+        for (name, place) in [("ball", DVec3::new(0.3, 0.1, -0.2)), ("lamp", DVec3::new(-0.25, 0.5, 0.125))] {
+            let id = still.object(name).unwrap();
+            let home = still.objects[id.0 as usize].world_from_rest;
+            moved = moved.with_object_placed(id, DAffine3::from_translation(place) * home).unwrap();
+        }
+        let mut published = PublishedScene::default();
+        let first = published.update(&frame(&still)).unwrap().clone();
+        assert_eq!((&first.geometry, &first.objects), (&still.geometry, &still.objects));
+        let parts = |scene: &Scene| scene.bvh.parts().map(std::ptr::from_ref).collect::<Vec<_>>();
+        let unmoved = published.update(&frame(&still)).unwrap();
+        assert!(Arc::ptr_eq(&unmoved.geometry, &first.geometry) && parts(unmoved) == parts(&first));
+        let followed = published.update(&frame(&moved)).unwrap().clone();
+        assert_eq!((&followed.geometry, &followed.objects), (&moved.geometry, &moved.objects));
+        assert_eq!((followed.bounds, followed.lights[0].light), (moved.bounds, moved.lights[0].light));
+        let floor = still.object("floor").unwrap().0 as usize;
+        for (index, (a, b)) in parts(&followed).into_iter().zip(parts(&first)).enumerate() {
+            assert_eq!(a == b, index == floor, "part {index}");
+        }
+        assert_eq!(published.update(&frame(&still)).unwrap().geometry, still.geometry);
+        // A bad motion is told, and the scene stays.
+        let mut bad = frame(&moved);
+        bad.objects[0].world_from_object[0] = 2.0;
+        let error = published.update(&bad).unwrap_err().to_string();
+        assert!(error.starts_with("object.ball.world_from_rest: found"), "{error}");
+        assert_eq!(published.update(&frame(&still)).unwrap().geometry, still.geometry);
+    }
 
     #[test]
     fn lights_become_their_shapes_and_bad_ones_are_named() {

@@ -3,6 +3,7 @@
 use super::render::{self, Simulated};
 use crate::{cli::Global, error::LauncherError, output, pictures::Look};
 use photonstream_renderer::LayerKind;
+use photonstream_renderer_cpu::CpuRenderer;
 use photonstream_simulator::cli::Overrides;
 use std::{
     path::{Path, PathBuf},
@@ -24,7 +25,7 @@ pub(crate) fn run(global: &Global) -> Result<(), LauncherError> {
     let outs = ["exr", "png"].map(|end| PathBuf::from(OUT).join("cornell-box").with_extension(end));
     let overrides = Overrides::default();
     let light = Simulated { config: scene.path(), overrides: &overrides, after: None, preview: true, begun };
-    let report = light.picture(&Look::default(), &[LayerKind::Full], &outs, global)?;
+    let report = light.picture(&mut CpuRenderer, &Look::default(), &[LayerKind::Full], &outs, global)?;
     output::report(global.json, &report, render::text)
 }
 

@@ -1,16 +1,17 @@
 //! Turns a scene, or a running simulation, into one picture.
 
 use crate::{
+    backend::{self, BUILT_IN_RENDERERS, GpuArgs},
     cli::Global,
     error::LauncherError,
     follow,
     output::{self, grouped, si},
     pictures::{Format, Job, Look},
     signals::Listener,
-    supervise::{BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Supervisor},
+    supervise::{ChildOutput, Kind, Role, Supervisor},
 };
 use photonstream_protocol::{ChannelName, ProtocolError, VslFrame};
-use photonstream_renderer::LayerKind;
+use photonstream_renderer::{FrameRenderer, LayerKind};
 use photonstream_scene::SceneConfig;
 use photonstream_simulator::cli::Overrides;
 use serde::Serialize;
@@ -29,6 +30,7 @@ the simulator ended. With --channel the present light of a running simulation is
 Examples:
   photonstream render configs/cornell-box.toml --out box.png
   photonstream render configs/cornell-box.toml --out box.exr --vsls 4000 --size 400x300
+  photonstream render configs/cornell-box.toml --out box.png --renderer wgpu --visibility ao --stats
   photonstream render --channel demo --out light.png --show full,indirect,vsl
 
 JSON: { \"scene\", \"scene_hash\", \"pictures\": [paths], \"frame\", \"vsls\", \"photon_paths\", \"rays_per_s\", \"converged\",
@@ -41,7 +43,7 @@ pub(crate) struct Args {
     /// Channel of a running simulation
     #[arg(long)]
     pub(crate) channel: Option<ChannelName>,
-    /// Renderer
+    /// Renderer: cpu or wgpu (the GPU)
     #[arg(long, default_value = "cpu", value_name = "NAME")]
     pub(crate) renderer: String,
     /// Picture file: .exr (linear) or .png (tone mapped)
@@ -55,6 +57,8 @@ pub(crate) struct Args {
     /// Render after this many photon paths instead of waiting for convergence
     #[arg(long, value_name = "PATHS", conflicts_with = "channel")]
     pub(crate) after: Option<u64>,
+    #[command(flatten)]
+    pub(crate) gpu: GpuArgs,
     #[command(flatten)]
     pub(crate) overrides: Overrides,
 }
@@ -90,12 +94,13 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     }
     // Before any work is done.
     Format::of(&args.out)?;
+    let mut renderer = backend::renderer(&args.renderer, &args.gpu)?;
     let outs = [args.out.clone()];
     let report = match (&args.config, &args.channel) {
         (Some(config), _) => {
             let (overrides, after) = (&args.overrides, args.after);
             let light = Simulated { config, overrides, after, preview: false, begun };
-            light.picture(&args.look, &args.show, &outs, global)?
+            light.picture(renderer.as_mut(), &args.look, &args.show, &outs, global)?
         }
         (None, Some(channel)) => {
             if !args.overrides.to_arguments().is_empty() {
@@ -108,7 +113,11 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
             let subscriber = follow::present_frame(channel)?;
             let frame = subscriber.frame().expect("invariant: present_frame waits for one");
             let (look, layers, preview) = (&args.look, args.show.as_slice(), false);
-            picture(frame, &Job { look, layers, outs: &outs, preview, begun, cancelled: &cancelled })?
+            picture(
+                frame,
+                renderer.as_mut(),
+                &Job { look, layers, outs: &outs, preview, begun, cancelled: &cancelled },
+            )?
         }
         (None, None) => unreachable!("invariant: clap requires one of them"),
     };
@@ -132,6 +141,7 @@ impl Simulated<'_> {
     /// Those of the simulator and of the renderer; interruption.
     pub(crate) fn picture(
         &self,
+        renderer: &mut dyn FrameRenderer,
         look: &Look,
         show: &[LayerKind],
         outs: &[PathBuf],
@@ -147,7 +157,7 @@ impl Simulated<'_> {
         remove_channel(&channel);
         let cancelled = supervisor.end_flag();
         let (preview, begun) = (self.preview, self.begun);
-        picture(&frame?, &Job { look, layers: show, outs, preview, begun, cancelled: &cancelled })
+        picture(&frame?, renderer, &Job { look, layers: show, outs, preview, begun, cancelled: &cancelled })
     }
 }
 
@@ -184,8 +194,12 @@ pub(crate) fn remove_channel(channel: &ChannelName) {
     }
 }
 
-fn picture(frame: &VslFrame, job: &Job<'_>) -> Result<Report, LauncherError> {
-    let made = job.make(frame)?;
+fn picture(
+    frame: &VslFrame,
+    renderer: &mut dyn FrameRenderer,
+    job: &Job<'_>,
+) -> Result<Report, LauncherError> {
+    let made = job.make(frame, renderer)?;
     Ok(Report {
         scene: made.film.metadata.scene_name.clone().unwrap_or_default(),
         scene_hash: format!("{:016x}", frame.scene_hash),

@@ -1,11 +1,16 @@
 //! Turns this process into a renderer that `run` has started.
 
-use crate::{cli::Global, error::LauncherError, owned, signals::Listener};
+use crate::{
+    backend::{self, GpuArgs},
+    cli::Global,
+    error::LauncherError,
+    owned,
+    signals::Listener,
+};
 use photonstream_renderer::{
     attach::{self, Ended},
     cli,
 };
-use photonstream_renderer_cpu::CpuRenderer;
 use std::ffi::OsString;
 
 /// Arguments of the hidden `photonstream renderer`.
@@ -20,6 +25,14 @@ pub(crate) struct Args {
 enum BuiltIn {
     /// On the CPU
     Cpu(cli::Args),
+    /// On the GPU
+    #[cfg(feature = "wgpu")]
+    Wgpu {
+        #[command(flatten)]
+        args: cli::Args,
+        #[command(flatten)]
+        gpu: GpuArgs,
+    },
 }
 
 /// Arguments of the hidden `photonstream exec`.
@@ -35,9 +48,13 @@ pub(crate) struct ExecArgs {
 
 pub(crate) fn run(args: &Args, _: &Global) -> Result<(), LauncherError> {
     owned::end_with_launcher();
-    let BuiltIn::Cpu(args) = &args.renderer;
     let cancelled = Listener::flag_only()?;
-    let report = attach::run(args, &mut CpuRenderer, &cancelled, &mut |picture| {
+    let (args, mut renderer) = match &args.renderer {
+        BuiltIn::Cpu(args) => (args, backend::renderer("cpu", &GpuArgs::default())?),
+        #[cfg(feature = "wgpu")]
+        BuiltIn::Wgpu { args, gpu } => (args, backend::renderer("wgpu", gpu)?),
+    };
+    let report = attach::run(args, renderer.as_mut(), &cancelled, &mut |picture| {
         let files: Vec<_> = picture.files.iter().map(|file| file.display().to_string()).collect();
         let ms = picture.stats.render_ms;
         tracing::info!("frame {} in {ms:.0} ms: {}", picture.frame, files.join(", "));

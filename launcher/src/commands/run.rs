@@ -2,13 +2,12 @@
 
 use super::render::{remove_channel, simulator, verbosity};
 use crate::{
+    backend::{self, BUILT_IN_RENDERERS, GpuArgs},
     cli::Global,
     error::LauncherError,
     follow, output,
     pictures::Look,
-    supervise::{
-        BUILT_IN_RENDERERS, ChildOutput, Kind, Role, Sequence, Supervisor, find_plug_in, written_since,
-    },
+    supervise::{ChildOutput, Kind, Role, Sequence, Supervisor, find_plug_in, written_since},
 };
 use photonstream_protocol::ChannelName;
 use photonstream_scene::SceneConfig;
@@ -23,13 +22,14 @@ use std::{
 /// Arguments of `photonstream run`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-A renderer NAME that is not built in (cpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
+A renderer NAME that is not built in (cpu, wgpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
 called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V].
 What crashes is started again; a built-in renderer then goes on with the next picture. Several renderers write to folders of their own in DIR.
 Ctrl-C ends all processes in order, a second one at once.
 
 Examples:
   photonstream run configs/cornell-box.toml
+  photonstream run room.toml --renderer cpu --renderer wgpu --stats --frames 5
   photonstream run room.toml --renderer cpu --renderer mine --headless --frames 20 --out film
 
 JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers\": [ { \"name\", \"folder\", \"pictures\": [paths],
@@ -37,7 +37,7 @@ JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers
 pub(crate) struct Args {
     /// Scene [default: the built-in Cornell box]
     config: Option<PathBuf>,
-    /// Renderer, built in (cpu) or a plug-in; may be given several times
+    /// Renderer, built in (cpu, wgpu) or a plug-in; may be given several times
     #[arg(long = "renderer", value_name = "NAME", default_value = "cpu")]
     renderers: Vec<String>,
     /// Without a window (this build has none)
@@ -54,6 +54,8 @@ pub(crate) struct Args {
     channel: Option<ChannelName>,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    gpu: GpuArgs,
     #[command(flatten)]
     overrides: Overrides,
 }
@@ -94,6 +96,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         None => format!("run-{}", std::process::id()).parse()?,
     };
     // Mistakes are told at once, by this process, before anything is started.
+    backend::check(args.renderers.iter().map(String::as_str), &args.gpu)?;
     let scene = scene_name(config, &SceneConfig::from_file(config)?);
     let folders = folders(&args.out, &args.renderers);
     let named = args.renderers.iter().zip(&folders);
@@ -209,6 +212,9 @@ fn renderer(
         }
     };
     arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
+    if name == "wgpu" {
+        arguments.extend(args.gpu.to_arguments().into_iter().map(OsString::from));
+    }
     // With several renderers their folders are named after them, and told apart.
     let shown = if args.renderers.len() == 1 {
         name.into()

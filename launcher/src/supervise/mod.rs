@@ -9,7 +9,7 @@ mod role;
 mod sequence;
 mod voice;
 
-pub(crate) use role::{BUILT_IN_RENDERERS, Kind, Role, find_plug_in};
+pub(crate) use role::{Kind, Role, find_plug_in};
 pub(crate) use sequence::{Sequence, written_since};
 pub(crate) use voice::ChildOutput;
 

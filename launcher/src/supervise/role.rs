@@ -1,16 +1,13 @@
 //! Turns what a process is for into the command that starts it.
 
 use super::sequence::Sequence;
-use crate::{error::LauncherError, owned::OWNED};
+use crate::{backend::BUILT_IN_RENDERERS, error::LauncherError, owned::OWNED};
 use std::{
     ffi::OsString,
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
-
-/// Renderers of this build.
-pub(crate) const BUILT_IN_RENDERERS: &[&str] = &["cpu"];
 
 /// What a process is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

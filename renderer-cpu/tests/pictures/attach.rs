@@ -198,7 +198,7 @@ fn a_closed_channel_ends_it_with_the_last_frame() {
 }
 
 #[test]
-fn signals_and_moved_objects_end_it_clearly() {
+fn a_signal_ends_it_while_it_waits() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     // Nothing to attach to: it waits until it is told to stop.
@@ -208,11 +208,29 @@ fn signals_and_moved_objects_end_it_clearly() {
     assert!(status.success());
     let output = ended(child);
     assert!(output.status.success(), "{}", stderr(&output));
+}
+
+/// The picture shows an object where the frame has it, not where the text puts it; a place that cannot be is told.
+#[test]
+fn moved_objects_are_followed() {
+    let root = tempfile::tempdir().unwrap();
     let mut simulator = Simulator::start(root.path());
-    simulator.publish_moved(10.0, true, 0.25);
-    let output = ended(renderer(root.path(), &out, &[]));
+    let mut depth_after = |shift: f64, out: &str| {
+        simulator.publish_moved(10.0, true, shift);
+        let out = root.path().join(out);
+        let output = ended(renderer(root.path(), &out, &["--show", "depth"]));
+        let film = Film::read_exr(&out.join("frame-0001.exr"));
+        (output, film.map(|film| film.layers()[0].pixels.clone()))
+    };
+    let (_, still) = depth_after(0.0, "still");
+    let (output, moved) = depth_after(0.25, "moved");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let (still, moved) = (still.unwrap(), moved.unwrap());
+    assert_ne!(still, moved);
+    assert_eq!(depth_after(0.0, "back").1.unwrap(), still);
+    let (output, _) = depth_after(5e9, "beyond");
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("object \"sphere\" has moved"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("object.sphere.world_from_rest: found a vertex"), "{}", stderr(&output));
 }
 
 const CHILD: &str = "PHOTONSTREAM_TEST_SIMULATOR";
