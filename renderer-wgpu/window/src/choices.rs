@@ -9,18 +9,18 @@ use photonstream_shading::{Camera, tone::ToneMap};
 
 /// What the user has chosen to see.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choices {
+pub(crate) struct Choices {
     /// All that the renderer is told, but for size and camera.
-    pub view: View,
+    pub(crate) view: View,
     /// Exposure in stops.
-    pub exposure_ev: f32,
+    pub(crate) exposure_ev: f32,
     /// Tone map.
-    pub tone_map: ToneMap,
+    pub(crate) tone_map: ToneMap,
 }
 
 impl Choices {
     /// The scene's own settings, and `args` over them.
-    pub fn new(settings: &RenderSettings, camera: &Camera, args: &Args) -> Self {
+    pub(crate) fn new(settings: &RenderSettings, camera: &Camera, args: &Args) -> Self {
         let mut view = View::from_settings(settings, camera);
         view.kernel = args.kernel.unwrap_or(view.kernel);
         view.visibility = args.visibility.unwrap_or(view.visibility);
@@ -31,14 +31,14 @@ impl Choices {
     }
 
     /// The view from `camera` onto `width` × `height` pixels of a scene with `lights` lights.
-    pub fn view(&self, camera: &Camera, width: u32, height: u32, lights: usize) -> View {
+    pub(crate) fn view(&self, camera: &Camera, width: u32, height: u32, lights: usize) -> View {
         let interleave = if self.view.accumulation == Accumulation::Tiled { self.view.interleave } else { 1 };
         let only_light = self.view.only_light.filter(|&light| (light as usize) < lights);
         View { width, height, camera: *camera, interleave, only_light, ..self.view }
     }
 
     /// How the picture becomes display colours.
-    pub fn display(&self) -> Display {
+    pub(crate) fn display(&self) -> Display {
         let settings = RenderSettings {
             exposure_ev: self.exposure_ev,
             tone_map: self.tone_map,
@@ -52,7 +52,7 @@ impl Choices {
     }
 
     /// The layer that a screenshot holds: the one shown, or for debug views the picture they explain.
-    pub fn layer(&self) -> LayerKind {
+    pub(crate) fn layer(&self) -> LayerKind {
         match self.view.show {
             Show::Layer(kind) => kind,
             Show::Discs | Show::Age | Show::Tiles => LayerKind::Full,
@@ -61,7 +61,7 @@ impl Choices {
 }
 
 /// What can be shown, with the name in the overlay.
-pub const SHOWS: [(Show, &str); 11] = [
+pub(crate) const SHOWS: [(Show, &str); 11] = [
     (Show::Layer(LayerKind::Full), "full"),
     (Show::Layer(LayerKind::Direct), "direct"),
     (Show::Layer(LayerKind::Indirect), "indirect"),
@@ -76,7 +76,7 @@ pub const SHOWS: [(Show, &str); 11] = [
 ];
 
 /// The name of what is shown.
-pub fn show_name(show: Show) -> &'static str {
+pub(crate) fn show_name(show: Show) -> &'static str {
     SHOWS.iter().find(|(s, _)| *s == show).map_or("", |(_, name)| name)
 }
 

@@ -19,7 +19,7 @@ const RETRIES: u32 = 50;
 
 /// What became of a request.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub(crate) enum Told {
     /// Done; visible from this frame on.
     Done {
         /// What was asked for.
@@ -67,7 +67,7 @@ impl Queue {
 
 /// Sends requests; never waits.
 #[derive(Debug)]
-pub struct Commands {
+pub(crate) struct Commands {
     shared: Arc<(Mutex<Queue>, Condvar)>,
 }
 
@@ -76,7 +76,10 @@ impl Commands {
     ///
     /// # Errors
     /// [`WindowError::Thread`].
-    pub fn start(channel: ChannelName, tell: impl Fn(Told) + Send + 'static) -> Result<Self, WindowError> {
+    pub(crate) fn start(
+        channel: ChannelName,
+        tell: impl Fn(Told) + Send + 'static,
+    ) -> Result<Self, WindowError> {
         let shared = Arc::new((Mutex::new(Queue::default()), Condvar::new()));
         let queue = Arc::clone(&shared);
         std::thread::Builder::new()
@@ -87,7 +90,7 @@ impl Commands {
     }
 
     /// Sends a request.
-    pub fn send(&self, request: Request) {
+    pub(crate) fn send(&self, request: Request) {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner).push(request);
         self.shared.1.notify_one();
     }
@@ -102,12 +105,12 @@ impl Drop for Commands {
 }
 
 /// Puts a light elsewhere, in the coordinates of the config.
-pub fn place_light(name: &str, position_m: DVec3) -> Request {
+pub(crate) fn place_light(name: &str, position_m: DVec3) -> Request {
     Request::SetLight { name: name.into(), values: value("position_m", place(position_m)) }
 }
 
 /// Gives a light another power: W, or W/m² for parallel light.
-pub fn power_light(name: &str, power: Vec3, is_parallel: bool) -> Request {
+pub(crate) fn power_light(name: &str, power: Vec3, is_parallel: bool) -> Request {
     let key = if is_parallel { "irradiance_w_m2" } else { "power_w" };
     // Six digits, so that messages and files read 12.5 and not 12.499999046325684.
     let digits = |p: f32| format!("{p:.5e}").parse::<f64>().unwrap_or(0.0);
@@ -115,12 +118,12 @@ pub fn power_light(name: &str, power: Vec3, is_parallel: bool) -> Request {
 }
 
 /// Switches a light on or off.
-pub fn switch_light(name: &str, enabled: bool) -> Request {
+pub(crate) fn switch_light(name: &str, enabled: bool) -> Request {
     Request::SetLight { name: name.into(), values: value("enabled", json!(enabled)) }
 }
 
 /// Puts an object elsewhere, in the coordinates of the config.
-pub fn place_object(name: &str, position_m: DVec3) -> Request {
+pub(crate) fn place_object(name: &str, position_m: DVec3) -> Request {
     Request::MoveObject { name: name.into(), values: value("position_m", place(position_m)) }
 }
 
@@ -154,11 +157,7 @@ fn talk(shared: &(Mutex<Queue>, Condvar), channel: &ChannelName, tell: &dyn Fn(T
 }
 
 /// Sends one request, over the connection that is there if it still is.
-fn ask(
-    client: &mut Option<ControlClient>,
-    channel: &ChannelName,
-    request: &Request,
-) -> Result<u64, String> {
+fn ask(client: &mut Option<ControlClient>, channel: &ChannelName, request: &Request) -> Result<u64, String> {
     for _ in 0..=RETRIES {
         let (mut connection, is_old) = match client.take() {
             Some(connection) if connection.is_alive() => (connection, true),

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 
 /// In which directions something is moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Along {
+pub(crate) enum Along {
     /// Parallel to the screen.
     Screen,
     /// Up and down this unit vector.
@@ -14,7 +14,7 @@ pub enum Along {
 
 /// A hold on something in the scene, from where it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
+pub(crate) struct Hold {
     /// The point that was taken hold of, in metres from the scene's origin.
     point: Vec3,
     /// Where the cursor was.
@@ -25,18 +25,18 @@ pub struct Hold {
 
 impl Hold {
     /// Takes hold at `point` with the cursor at `cursor` of something that stands at `start_m`.
-    pub fn new(point: Vec3, cursor: [f32; 2], start_m: DVec3) -> Self {
+    pub(crate) fn new(point: Vec3, cursor: [f32; 2], start_m: DVec3) -> Self {
         Self { point, cursor, start_m }
     }
 
     /// Where the thing stood at the start.
-    pub fn start_m(&self) -> DVec3 {
+    pub(crate) fn start_m(&self) -> DVec3 {
         self.start_m
     }
 
     /// Where it has to stand for the cursor at `cursor` to hold it at the same point; `None` where the cursor points
     /// past the horizon of that motion.
-    pub fn position_m(&self, eye: &Eye<'_>, cursor: [f32; 2], along: Along) -> Option<DVec3> {
+    pub(crate) fn position_m(&self, eye: &Eye<'_>, cursor: [f32; 2], along: Along) -> Option<DVec3> {
         let (from, to) = (self.place(eye, self.cursor, along)?, self.place(eye, cursor, along)?);
         let moved = self.start_m + (to - from).as_dvec3();
         moved.is_finite().then_some(moved)

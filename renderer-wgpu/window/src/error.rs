@@ -22,7 +22,9 @@ pub enum WindowError {
         reason: String,
     },
     /// Nothing can be shown in this window.
-    #[error("the window takes no pictures of {adapter} ({reason}); choose another with --adapter, or use --headless")]
+    #[error(
+        "the window takes no pictures of {adapter} ({reason}); choose another with --adapter, or use --headless"
+    )]
     Surface {
         /// Name of the adapter.
         adapter: String,
@@ -46,7 +48,9 @@ pub enum WindowError {
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
     /// A thread could not be started.
-    #[error("a thread of the window cannot be started: {reason}; end other programs or raise the limit of processes")]
+    #[error(
+        "a thread of the window cannot be started: {reason}; end other programs or raise the limit of processes"
+    )]
     Thread {
         /// What the system said.
         reason: String,

@@ -2,7 +2,8 @@
 
 use crate::{WindowError, standing::Standing};
 use photonstream_protocol::{
-    AccessMode, ChannelName, LightRecord, Liveness, ObjectRecord, ProtocolError, Reading, Subscriber, VslFrame,
+    AccessMode, ChannelName, LightRecord, Liveness, ObjectRecord, ProtocolError, Reading, Subscriber,
+    VslFrame,
 };
 use photonstream_renderer::{RenderError, published::PublishedScene};
 use photonstream_scene::Scene;
@@ -19,18 +20,18 @@ const LOOK: Duration = Duration::from_millis(50);
 
 /// A published frame and the scene it was computed for.
 #[derive(Clone, Debug)]
-pub struct Published {
+pub(crate) struct Published {
     /// The frame.
-    pub frame: Arc<VslFrame>,
+    pub(crate) frame: Arc<VslFrame>,
     /// Its scene; the same one for as long as nothing in it has changed.
-    pub scene: Arc<Scene>,
+    pub(crate) scene: Arc<Scene>,
     /// Where things stand in the coordinates of the config.
-    pub standing: Arc<Standing>,
+    pub(crate) standing: Arc<Standing>,
 }
 
 /// What is known of the simulator.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
-pub enum Connection {
+pub(crate) enum Connection {
     /// There is no channel yet.
     #[default]
     Waiting,
@@ -40,17 +41,17 @@ pub enum Connection {
 
 /// What has happened since the last look.
 #[derive(Debug, Default)]
-pub struct News {
+pub(crate) struct News {
     /// A newer frame.
-    pub published: Option<Published>,
+    pub(crate) published: Option<Published>,
     /// What is known of the simulator.
-    pub connection: Connection,
+    pub(crate) connection: Connection,
     /// What is wrong with the channel or its scene now, if anything.
-    pub problem: Option<String>,
+    pub(crate) problem: Option<String>,
     /// Why nothing will ever come.
-    pub fatal: Option<ProtocolError>,
+    fatal: Option<ProtocolError>,
     /// Somebody asked the program to end.
-    pub is_cancelled: bool,
+    is_cancelled: bool,
 }
 
 #[derive(Debug, Default)]
@@ -68,7 +69,7 @@ impl Shared {
 
 /// Follows a channel.
 #[derive(Debug)]
-pub struct Following {
+pub(crate) struct Following {
     shared: Arc<Shared>,
 }
 
@@ -78,7 +79,7 @@ impl Following {
     ///
     /// # Errors
     /// [`WindowError::Thread`].
-    pub fn start(
+    pub(crate) fn start(
         channel: ChannelName,
         cancelled: Arc<AtomicBool>,
         wake: impl Fn() + Send + 'static,
@@ -98,15 +99,23 @@ impl Following {
         Ok(Self { shared })
     }
 
+    /// Why there will be no more news: somebody asked to stop, or the channel cannot be read; `None` as long as there may.
+    pub(crate) fn ended(&self) -> Option<Result<(), ProtocolError>> {
+        let mut news = self.shared.lock();
+        match news.fatal.take() {
+            Some(error) => Some(Err(error)),
+            None => news.is_cancelled.then_some(Ok(())),
+        }
+    }
+
     /// What is new; frames that were published in between are skipped.
-    pub fn take(&self) -> News {
+    pub(crate) fn take(&self) -> News {
         let mut news = self.shared.lock();
         let taken = News {
             published: news.published.take(),
             connection: news.connection.clone(),
             problem: news.problem.clone(),
-            fatal: news.fatal.take(),
-            is_cancelled: news.is_cancelled,
+            ..News::default()
         };
         drop(news);
         self.shared.taken.notify_one();
@@ -197,7 +206,9 @@ impl<W: Fn()> Follower<W> {
             let standing = match known {
                 Some(known) => known.standing,
                 None => Arc::new(
-                    Scene::from_resolved(&frame.scene_text).map(|at_rest| Standing::of(&at_rest)).unwrap_or_default(),
+                    Scene::from_resolved(&frame.scene_text)
+                        .map(|at_rest| Standing::of(&at_rest))
+                        .unwrap_or_default(),
                 ),
             };
             self.known = Some(Known {

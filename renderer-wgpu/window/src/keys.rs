@@ -11,7 +11,7 @@ const TURN: f32 = 1.2;
 const EXPOSURE_STEP: f32 = 0.25;
 
 /// What keys do, for the help text: key, effect.
-pub const HELP: [(&str, &str); 18] = [
+pub(crate) const HELP: [(&str, &str); 18] = [
     ("drag left", "circle; on a thing or a light: move it"),
     ("shift + drag", "move it up and down"),
     ("ctrl + drag", "move walls too"),
@@ -34,20 +34,20 @@ pub const HELP: [(&str, &str); 18] = [
 
 /// The keys that move the camera and are held down.
 #[derive(Clone, Debug, Default)]
-pub struct Motion {
+pub(crate) struct Motion {
     held: Vec<KeyCode>,
     fast: bool,
 }
 
 impl Motion {
     /// All keys are up: the window has lost the keyboard.
-    pub fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.held.clear();
         self.fast = false;
     }
 
     /// Whether shift is down.
-    pub fn set_fast(&mut self, fast: bool) {
+    pub(crate) fn set_fast(&mut self, fast: bool) {
         self.fast = fast;
     }
 
@@ -59,7 +59,7 @@ impl Motion {
     }
 
     /// Moves the camera for `seconds`; whether a key is held.
-    pub fn advance(&self, navigation: &mut Navigation, seconds: f32) -> bool {
+    pub(crate) fn advance(&self, navigation: &mut Navigation, seconds: f32) -> bool {
         let down = |key| f32::from(u8::from(self.held.contains(&key)));
         let axis = |plus, minus| down(plus) - down(minus);
         let motion = Vec3::new(
@@ -182,8 +182,17 @@ mod tests {
     #[test]
     fn every_view_has_a_key_of_its_own() {
         let keys = [
-            KeyCode::Digit1, KeyCode::Digit2, KeyCode::Digit3, KeyCode::Digit4, KeyCode::Digit5, KeyCode::Digit6,
-            KeyCode::Digit7, KeyCode::Digit8, KeyCode::Digit9, KeyCode::Digit0, KeyCode::KeyT,
+            KeyCode::Digit1,
+            KeyCode::Digit2,
+            KeyCode::Digit3,
+            KeyCode::Digit4,
+            KeyCode::Digit5,
+            KeyCode::Digit6,
+            KeyCode::Digit7,
+            KeyCode::Digit8,
+            KeyCode::Digit9,
+            KeyCode::Digit0,
+            KeyCode::KeyT,
         ];
         let mut indices: Vec<_> = keys.into_iter().filter_map(show_of).collect();
         indices.dedup();

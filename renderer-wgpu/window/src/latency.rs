@@ -4,17 +4,17 @@ use photonstream_protocol::VslFrame;
 
 /// How long the last edit took.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Latency {
+pub(crate) struct Latency {
     edit_received_ns: u64,
     /// From the edit's arrival at the simulator to the first frame with its light, in ms.
-    pub published_ms: f64,
+    pub(crate) published_ms: f64,
     /// From then until the window had handed the picture to the display, in ms.
-    pub shown_ms: f64,
+    pub(crate) shown_ms: f64,
 }
 
 impl Latency {
     /// Takes note of a frame that has just been shown, at `now_ns` of the clock that the frame uses.
-    pub fn shown(&mut self, frame: &VslFrame, now_ns: u64) {
+    pub(crate) fn shown(&mut self, frame: &VslFrame, now_ns: u64) {
         let statistics = &frame.statistics;
         let received = statistics.edit_received_ns;
         // Frames go on to carry the last edit: the first one counts.
@@ -30,7 +30,7 @@ impl Latency {
     }
 
     /// Whether there has been an edit.
-    pub fn is_known(&self) -> bool {
+    pub(crate) fn is_known(&self) -> bool {
         self.edit_received_ns != 0
     }
 }

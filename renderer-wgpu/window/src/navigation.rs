@@ -16,7 +16,7 @@ const FARTHEST: f32 = 1e3;
 
 /// A camera that the user moves. Lengths in metres from the scene's origin.
 #[derive(Clone, Debug)]
-pub struct Navigation {
+pub(crate) struct Navigation {
     camera: Camera,
     home: Camera,
     home_distance: f32,
@@ -28,7 +28,7 @@ pub struct Navigation {
 
 impl Navigation {
     /// A camera at `home`, circling about the point `distance` ahead, in a scene of radius `extent`.
-    pub fn new(home: Camera, distance: f32, extent: f32) -> Self {
+    pub(crate) fn new(home: Camera, distance: f32, extent: f32) -> Self {
         // Without roll the picture's right is level; a rolled camera keeps its own vertical.
         let is_level = home.right.y.abs() < 1e-3 && home.up.y > 0.02;
         let vertical = if is_level { Vec3::Y } else { home.up };
@@ -38,34 +38,34 @@ impl Navigation {
     }
 
     /// The camera now.
-    pub fn camera(&self) -> &Camera {
+    pub(crate) fn camera(&self) -> &Camera {
         &self.camera
     }
 
     /// Where it started.
-    pub fn home(&self) -> &Camera {
+    pub(crate) fn home(&self) -> &Camera {
         &self.home
     }
 
     /// Unit vector that stays upright.
-    pub fn vertical(&self) -> Vec3 {
+    pub(crate) fn vertical(&self) -> Vec3 {
         self.vertical
     }
 
     /// Puts the camera back where it started.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         (self.camera, self.distance) = (self.home, self.home_distance);
     }
 
     /// Circles about the pivot: `dx` to the right and `dy` down, in radians of turning the scene by hand.
-    pub fn orbit(&mut self, dx: f32, dy: f32) {
+    pub(crate) fn orbit(&mut self, dx: f32, dy: f32) {
         let pivot = self.camera.position + self.camera.forward * self.distance;
         self.turn(dx, -dy);
         self.move_to(pivot - self.camera.forward * self.distance);
     }
 
     /// Turns the head: `right` and `up` in radians.
-    pub fn turn(&mut self, right: f32, up: f32) {
+    pub(crate) fn turn(&mut self, right: f32, up: f32) {
         let vertical = self.vertical;
         let level = self.camera.right.cross(vertical);
         let forward = self.camera.forward;
@@ -80,13 +80,13 @@ impl Navigation {
     }
 
     /// Shifts camera and pivot by shares of the picture's height, so that what lies at the pivot follows the hand.
-    pub fn pan(&mut self, dx: f32, dy: f32) {
+    pub(crate) fn pan(&mut self, dx: f32, dy: f32) {
         let height = 2.0 * self.camera.tan_half_fov * self.distance;
         self.move_to(self.camera.position + (self.camera.up * dy - self.camera.right * dx) * height);
     }
 
     /// Goes nearer by so many notches of the wheel, away from the pivot by negative ones.
-    pub fn dolly(&mut self, notches: f32) {
+    pub(crate) fn dolly(&mut self, notches: f32) {
         if !notches.is_finite() {
             return;
         }
@@ -97,10 +97,9 @@ impl Navigation {
     }
 
     /// Flies for `seconds`: `motion` in [-1, 1] to the right, up and ahead.
-    pub fn fly(&mut self, motion: Vec3, seconds: f32, fast: bool) {
+    pub(crate) fn fly(&mut self, motion: Vec3, seconds: f32, fast: bool) {
         let speed = SPEED * self.extent * if fast { FASTER } else { 1.0 };
-        let along =
-            self.camera.right * motion.x + self.vertical * motion.y + self.camera.forward * motion.z;
+        let along = self.camera.right * motion.x + self.vertical * motion.y + self.camera.forward * motion.z;
         self.move_to(self.camera.position + along.clamp_length_max(1.0) * (speed * seconds));
     }
 
@@ -112,17 +111,15 @@ impl Navigation {
 }
 
 /// Where `point` is in a picture of `width` × `height` pixels; `None` behind the camera.
-pub fn project(camera: &Camera, point: Vec3, width: u32, height: u32) -> Option<[f32; 2]> {
+pub(crate) fn project(camera: &Camera, point: Vec3, width: u32, height: u32) -> Option<[f32; 2]> {
     let d = point - camera.position;
     let depth = d.dot(camera.forward);
     if depth.is_nan() || depth <= 1e-6 * d.length() {
         return None;
     }
     let scale = height as f32 / (2.0 * camera.tan_half_fov * depth);
-    let place = [
-        0.5 * width as f32 + d.dot(camera.right) * scale,
-        0.5 * height as f32 - d.dot(camera.up) * scale,
-    ];
+    let place =
+        [0.5 * width as f32 + d.dot(camera.right) * scale, 0.5 * height as f32 - d.dot(camera.up) * scale];
     place.iter().all(|x| x.is_finite()).then_some(place)
 }
 
@@ -131,17 +128,19 @@ mod tests {
     use super::*;
 
     fn navigation() -> Navigation {
-        let home = Camera::look_at(Vec3::new(0.0, 1.0, 4.0), Vec3::new(0.0, 1.0, 0.0), Vec3::Y, 40.0).unwrap();
+        let home =
+            Camera::look_at(Vec3::new(0.0, 1.0, 4.0), Vec3::new(0.0, 1.0, 0.0), Vec3::Y, 40.0).unwrap();
         Navigation::new(home, 4.0, 2.0)
     }
 
     fn assert_orthonormal(camera: &Camera) {
         let Camera { forward, right, up, .. } = *camera;
         // Rounding of unit vectors in f32.
-        for (a, b, dot) in [(forward, forward, 1.0), (right, right, 1.0), (up, up, 1.0)]
-            .into_iter()
-            .chain([(forward, right, 0.0), (forward, up, 0.0), (right, up, 0.0)])
-        {
+        for (a, b, dot) in [(forward, forward, 1.0), (right, right, 1.0), (up, up, 1.0)].into_iter().chain([
+            (forward, right, 0.0),
+            (forward, up, 0.0),
+            (right, up, 0.0),
+        ]) {
             assert!((a.dot(b) - dot).abs() < 1e-5, "{camera:?}");
         }
         assert!(right.cross(forward).dot(up) > 0.99);

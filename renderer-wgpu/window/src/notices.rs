@@ -9,26 +9,26 @@ const MOST: usize = 5;
 
 /// A message.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Notice {
+pub(crate) struct Notice {
     /// What it says.
-    pub text: String,
+    pub(crate) text: String,
     /// Whether something went wrong.
-    pub is_error: bool,
+    pub(crate) is_error: bool,
     until: Instant,
 }
 
 /// The messages of the last seconds, the newest last.
 #[derive(Clone, Debug, Default)]
-pub struct Notices(Vec<Notice>);
+pub(crate) struct Notices(Vec<Notice>);
 
 impl Notices {
     /// Says something; said again, it stays longer.
-    pub fn say(&mut self, text: impl Into<String>, now: Instant) {
+    pub(crate) fn say(&mut self, text: impl Into<String>, now: Instant) {
         self.add(text.into(), false, now);
     }
 
     /// Says that something went wrong.
-    pub fn warn(&mut self, text: impl Into<String>, now: Instant) {
+    pub(crate) fn warn(&mut self, text: impl Into<String>, now: Instant) {
         self.add(text.into(), true, now);
     }
 
@@ -45,7 +45,7 @@ impl Notices {
     }
 
     /// The messages to be shown, and after which time to look again.
-    pub fn now(&mut self, now: Instant) -> (&[Notice], Option<Duration>) {
+    pub(crate) fn now(&mut self, now: Instant) -> (&[Notice], Option<Duration>) {
         self.0.retain(|notice| notice.until > now);
         let next = self.0.iter().map(|notice| notice.until - now).min();
         (&self.0, next)
@@ -64,7 +64,10 @@ mod tests {
         notices.warn("b", start + Duration::from_secs(3));
         notices.say("a", start + Duration::from_secs(4));
         let (shown, next) = notices.now(start + Duration::from_secs(5));
-        assert_eq!(shown.iter().map(|n| (n.text.as_str(), n.is_error)).collect::<Vec<_>>(), [("b", true), ("a", false)]);
+        assert_eq!(
+            shown.iter().map(|n| (n.text.as_str(), n.is_error)).collect::<Vec<_>>(),
+            [("b", true), ("a", false)]
+        );
         assert_eq!(next, Some(Duration::from_secs(4)));
         assert_eq!(notices.now(start + Duration::from_secs(9)).0.len(), 1);
         assert_eq!(notices.now(start + Duration::from_secs(10)).1, None);

@@ -6,13 +6,13 @@ use photonstream_scene::{LightId, ObjectId, Scene, bvh::Ray};
 use photonstream_shading::{Camera, Light, LightShape};
 
 /// Radius of a light's icon on the screen, in points.
-pub const ICON_POINTS: f32 = 11.0;
+pub(crate) const ICON_POINTS: f32 = 11.0;
 /// From this share of the scene's radius on an object is taken for a wall, which is not moved by accident.
 const WALL_SHARE: f32 = 0.5;
 
 /// What can be selected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
+pub(crate) enum Target {
     /// A light, by its icon.
     Light(LightId),
     /// An object, by its surface.
@@ -21,34 +21,36 @@ pub enum Target {
 
 /// What is under the cursor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pick {
+pub(crate) struct Pick {
     /// Light or object.
-    pub target: Target,
+    pub(crate) target: Target,
     /// The point that was taken hold of, in metres from the scene's origin.
-    pub point: Vec3,
+    pub(crate) point: Vec3,
 }
 
 /// A picture of a scene: where things are on the screen.
 #[derive(Clone, Copy, Debug)]
-pub struct Eye<'a> {
+pub(crate) struct Eye<'a> {
     /// From where it is seen.
-    pub camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     /// Width in pixels.
-    pub width: u32,
+    pub(crate) width: u32,
     /// Height in pixels.
-    pub height: u32,
+    pub(crate) height: u32,
 }
 
 impl Eye<'_> {
     /// Unit direction through `cursor`, in pixels from the upper left corner.
-    pub fn direction(&self, cursor: [f32; 2]) -> Vec3 {
+    pub(crate) fn direction(&self, cursor: [f32; 2]) -> Vec3 {
         self.camera.direction(cursor[0], cursor[1], self.width, self.height)
     }
 
     /// The light whose icon is under `cursor`, else the nearest surface; `radius` of the icons in pixels, `None` where
     /// they are not shown.
-    pub fn pick(&self, scene: &Scene, cursor: [f32; 2], radius: Option<f32>) -> Option<Pick> {
-        radius.and_then(|radius| self.pick_light(scene, cursor, radius)).or_else(|| self.pick_object(scene, cursor))
+    pub(crate) fn pick(&self, scene: &Scene, cursor: [f32; 2], radius: Option<f32>) -> Option<Pick> {
+        radius
+            .and_then(|radius| self.pick_light(scene, cursor, radius))
+            .or_else(|| self.pick_object(scene, cursor))
     }
 
     fn pick_light(&self, scene: &Scene, cursor: [f32; 2], radius: f32) -> Option<Pick> {
@@ -72,7 +74,7 @@ impl Eye<'_> {
 }
 
 /// Where a light is taken hold of: where it stands, or the middle of its surface; `None` for parallel light.
-pub fn anchor(light: &Light) -> Option<Vec3> {
+pub(crate) fn anchor(light: &Light) -> Option<Vec3> {
     match light.shape {
         LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
         LightShape::Directional { .. } => None,
@@ -82,7 +84,7 @@ pub fn anchor(light: &Light) -> Option<Vec3> {
 }
 
 /// Whether an object is so large that dragging on it means the scene as a whole.
-pub fn is_wall(scene: &Scene, object: ObjectId) -> bool {
+pub(crate) fn is_wall(scene: &Scene, object: ObjectId) -> bool {
     let Some(object) = scene.objects.get(object.0 as usize) else { return true };
     let triangles = object.triangles.start as usize..object.triangles.end as usize;
     let vertices = scene.geometry.triangles[triangles].iter().flatten();
@@ -98,8 +100,11 @@ mod tests {
     use super::*;
 
     fn cornell() -> Scene {
-        Scene::load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/cornell-box.toml")))
-            .unwrap()
+        Scene::load(std::path::Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../configs/cornell-box.toml"
+        )))
+        .unwrap()
     }
 
     fn name(scene: &Scene, pick: Option<Pick>) -> String {

@@ -15,7 +15,7 @@ const CLICK_POINTS: f32 = 4.0;
 
 /// A button of the mouse that does something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Button {
+pub(crate) enum Button {
     /// Takes hold of things, and circles beside them.
     Left,
     /// Circles.
@@ -26,13 +26,13 @@ pub enum Button {
 
 /// Where the cursor is and what it is doing.
 #[derive(Clone, Debug, Default)]
-pub struct Pointer {
+pub(crate) struct Pointer {
     cursor: [f32; 2],
     gesture: Option<Gesture>,
     /// Shift: things move up and down.
-    pub shift: bool,
+    pub(crate) shift: bool,
     /// Control: walls are taken hold of too.
-    pub control: bool,
+    pub(crate) control: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -60,18 +60,13 @@ enum Thing {
 }
 
 impl Pointer {
-    /// Where the cursor is, in pixels.
-    pub fn cursor(&self) -> [f32; 2] {
-        self.cursor
-    }
-
     /// Forgets what is being done.
-    pub fn let_go(&mut self) {
+    pub(crate) fn let_go(&mut self) {
         self.gesture = None;
     }
 
     /// Whether a thing is being held.
-    pub fn is_holding(&self) -> bool {
+    pub(crate) fn is_holding(&self) -> bool {
         matches!(&self.gesture, Some(Gesture { kind: Kind::Hold { .. }, .. }))
     }
 }
@@ -88,7 +83,8 @@ impl Session {
             Button::Right => Kind::Orbit(None),
             Button::Left => {
                 let radius = self.shows_overlay.then_some(ICON_POINTS * self.scale);
-                let pick = self.eye().zip(self.scene()).and_then(|(eye, scene)| eye.pick(scene, cursor, radius));
+                let pick =
+                    self.eye().zip(self.scene()).and_then(|(eye, scene)| eye.pick(scene, cursor, radius));
                 match pick.and_then(|pick| self.take_hold(&pick)) {
                     Some(kind) => {
                         self.select(pick.map(|p| p.target));
@@ -140,7 +136,8 @@ impl Session {
 
     /// Moves what is held to the cursor.
     pub(crate) fn drag(&mut self) {
-        let Some(Gesture { kind: Kind::Hold { hold, thing }, is_drag: true, .. }) = &self.pointer.gesture else {
+        let Some(Gesture { kind: Kind::Hold { hold, thing }, is_drag: true, .. }) = &self.pointer.gesture
+        else {
             return;
         };
         let Some((eye, navigation)) = self.eye().zip(self.navigation.as_ref()) else { return };
@@ -321,6 +318,8 @@ mod tests {
         session.point([30.0, 300.0]);
         session.press(Button::Left);
         session.point([60.0, 310.0]);
-        assert!(matches!(session.outbox.last(), Some(Request::MoveObject { name, .. }) if name == "left-wall"));
+        assert!(
+            matches!(session.outbox.last(), Some(Request::MoveObject { name, .. }) if name == "left-wall")
+        );
     }
 }

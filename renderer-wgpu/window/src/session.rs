@@ -16,14 +16,11 @@ use crate::{
 use photonstream_protocol::{Liveness, Request};
 use photonstream_renderer_wgpu::{PassTime, View};
 use photonstream_scene::{LightId, ObjectId, Scene, bvh::Ray};
-use std::{
-    collections::BTreeSet,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 /// What is selected, by its name in the scene: numbers change with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Selected {
+pub(crate) enum Selected {
     /// A light.
     Light(String),
     /// An object.
@@ -32,22 +29,24 @@ pub enum Selected {
 
 /// What the last picture took.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Effort {
+pub(crate) struct Effort {
     /// From the start of drawing until all was handed to the device, in ms.
-    pub frame_ms: f64,
+    pub(crate) frame_ms: f64,
     /// Time of each pass on the device.
-    pub passes: Vec<PassTime>,
+    pub(crate) passes: Vec<PassTime>,
 }
 
 /// The state of the window; it survives the loss of surface and device.
 #[derive(Debug)]
-pub struct Session {
+pub(crate) struct Session {
     pub(crate) args: Args,
     pub(crate) published: Option<Published>,
     pub(crate) connection: Connection,
     pub(crate) problem: Option<String>,
     pub(crate) navigation: Option<Navigation>,
     pub(crate) choices: Option<Choices>,
+    /// The last ones that could be drawn.
+    good_choices: Option<Choices>,
     pub(crate) selected: Option<Selected>,
     pub(crate) draft: Draft,
     pub(crate) shows_overlay: bool,
@@ -66,8 +65,9 @@ pub struct Session {
     pub(crate) size: (u32, u32),
     /// Pixels per point of the interface.
     pub(crate) scale: f32,
-    shown: BTreeSet<(u64, u64)>,
-    shown_count: u64,
+    /// Segment and number of the last frame that was shown.
+    last_shown: Option<(u64, u64)>,
+    shown_frames: u64,
 }
 
 impl Session {
@@ -80,6 +80,7 @@ impl Session {
             problem: None,
             navigation: None,
             choices: None,
+            good_choices: None,
             selected: None,
             draft: Draft::default(),
             shows_overlay: true,
@@ -95,8 +96,8 @@ impl Session {
             outbox: Vec::new(),
             size: (0, 0),
             scale: 1.0,
-            shown: BTreeSet::new(),
-            shown_count: 0,
+            last_shown: None,
+            shown_frames: 0,
         }
     }
 
@@ -168,20 +169,18 @@ impl Session {
     pub(crate) fn count_shown(&mut self, now_ns: u64) -> bool {
         if let Some(published) = &self.published {
             let frame = &published.frame;
-            let is_new = self.shown.insert((frame.epoch, frame.frame));
-            if is_new {
-                self.shown_count += 1;
+            let this = Some((frame.epoch, frame.frame));
+            if std::mem::replace(&mut self.last_shown, this) != this {
+                self.shown_frames += 1;
                 self.latency.shown(frame, now_ns);
             }
-            // The last one is all that is needed to tell the next.
-            self.shown.retain(|&shown| shown == (frame.epoch, frame.frame));
         }
-        self.args.frames.is_some_and(|frames| self.shown_count >= frames)
+        self.args.frames.is_some_and(|frames| self.shown_frames >= frames)
     }
 
     /// Frames that were shown.
     pub(crate) fn shown_frames(&self) -> u64 {
-        self.shown_count
+        self.shown_frames
     }
 
     pub(crate) fn scene(&self) -> Option<&Scene> {
@@ -190,11 +189,29 @@ impl Session {
 
     pub(crate) fn select(&mut self, target: Option<Target>) {
         self.selected = self.scene().zip(target).and_then(|(scene, target)| match target {
-            Target::Light(LightId(id)) => scene.lights.get(id as usize).map(|l| Selected::Light(l.name.clone())),
+            Target::Light(LightId(id)) => {
+                scene.lights.get(id as usize).map(|l| Selected::Light(l.name.clone()))
+            }
             Target::Object(ObjectId(id)) => {
                 scene.objects.get(id as usize).map(|o| Selected::Object(o.name.clone()))
             }
         });
+    }
+
+    /// What is chosen now can be drawn.
+    pub(crate) fn keep_choices(&mut self) {
+        if self.good_choices != self.choices {
+            self.good_choices.clone_from(&self.choices);
+        }
+    }
+
+    /// What is chosen now cannot be drawn.
+    pub(crate) fn put_back_choices(&mut self) {
+        if self.good_choices.is_some() {
+            self.choices.clone_from(&self.good_choices);
+        } else if let (Some(choices), Some(published)) = (&mut self.choices, &self.published) {
+            choices.view = View::from_settings(&published.scene.render, &published.scene.camera);
+        }
     }
 
     pub(crate) fn is_paused(&self) -> bool {

@@ -7,26 +7,28 @@ use std::path::Path;
 
 /// Where the origin of each object lies in its rest space, found once for a scene's text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Standing {
+pub(crate) struct Standing {
     /// By object: its name for edits, and the middle of its rest space seen from its own origin.
     objects: Vec<(String, DVec3)>,
 }
 
 impl Standing {
     /// Reads a scene that is as its text says.
-    pub fn of(scene: &Scene) -> Self {
+    pub(crate) fn of(scene: &Scene) -> Self {
         // The scene was made from this text; where it could not be read, nothing could be moved by name.
         let Ok(config) = SceneConfig::from_text(&scene.resolved_text, Path::new("")) else {
             return Self::default();
         };
         let objects = scene.objects.iter().map(|object| {
             let import = object.name.split('/').next().unwrap_or_default();
-            let name = if config.object.contains_key(&object.name) || config.light.contains_key(&object.name) {
+            let name = if config.object.contains_key(&object.name) || config.light.contains_key(&object.name)
+            {
                 &object.name
             } else {
                 import
             };
-            let written = config.object.get(name).and_then(|o| o.position_m).map_or(DVec3::ZERO, |p| p.0.into());
+            let written =
+                config.object.get(name).and_then(|o| o.position_m).map_or(DVec3::ZERO, |p| p.0.into());
             let DAffine3 { matrix3, translation } = object.world_from_rest;
             (name.to_owned(), matrix3.transpose() * (translation - (written - scene.origin_m)))
         });
@@ -34,14 +36,14 @@ impl Standing {
     }
 
     /// The name by which an object is moved, and its `position_m` now.
-    pub fn object(&self, scene: &Scene, id: ObjectId) -> Option<(String, DVec3)> {
+    pub(crate) fn object(&self, scene: &Scene, id: ObjectId) -> Option<(String, DVec3)> {
         let (name, centre) = self.objects.get(id.0 as usize)?;
         let DAffine3 { matrix3, translation } = scene.objects.get(id.0 as usize)?.world_from_rest;
         Some((name.clone(), translation - matrix3 * *centre + scene.origin_m))
     }
 
     /// The `position_m` of a light without a surface; `None` for others, which stand where their objects do.
-    pub fn light(scene: &Scene, id: LightId) -> Option<DVec3> {
+    pub(crate) fn light(scene: &Scene, id: LightId) -> Option<DVec3> {
         let light = scene.lights.get(id.0 as usize)?;
         let position = anchor(&light.light).filter(|_| light.object.is_none())?;
         Some(position.as_dvec3() + scene.origin_m)

@@ -1,0 +1,113 @@
+//! Turns the switches of the view into an interface.
+
+use super::window;
+use crate::{
+    choices::{Choices, SHOWS, show_name},
+    session::Session,
+};
+use egui::{ComboBox, Context, Grid, Slider, Ui, pos2};
+use photonstream_protocol::Request;
+use photonstream_renderer_wgpu::{Accumulation, Shadows};
+use photonstream_scene::{Scene, Visibility};
+use photonstream_shading::{Kernel, tone::ToneMap};
+
+pub(super) fn show(ctx: &Context, session: &mut Session) {
+    window("View", pos2(8.0, 8.0)).show(ctx, |ui| {
+        ui.horizontal(|ui| {
+            let is_paused = session.is_paused();
+            if ui.button(if is_paused { "Resume" } else { "Pause" }).clicked() {
+                session.toggle_pause();
+            }
+            if ui.add_enabled(is_paused, egui::Button::new("Step")).clicked() {
+                session.outbox.push(Request::Step);
+            }
+            if ui.button("Screenshot").clicked() {
+                session.wants_screenshot = true;
+            }
+            if ui.button("Keys").clicked() {
+                session.shows_help = !session.shows_help;
+            }
+        });
+        let published = session.published.clone();
+        if let (Some(choices), Some(published)) = (&mut session.choices, published) {
+            Grid::new("view").num_columns(2).show(ui, |ui| switches(ui, choices, &published.scene));
+            if ui.button("Camera home").clicked()
+                && let Some(navigation) = &mut session.navigation
+            {
+                navigation.reset();
+            }
+        }
+    });
+}
+
+fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
+    let view = &mut choices.view;
+    row(ui, "show", |ui| {
+        let names = SHOWS.iter().map(|&(show, name)| (show, name.to_owned())).collect();
+        let now = show_name(view.show).to_owned();
+        combo(ui, "show", &mut view.show, names, now);
+    });
+    row(ui, "exposure", |ui| {
+        ui.add(Slider::new(&mut choices.exposure_ev, -8.0..=8.0).suffix(" EV").step_by(0.05));
+    });
+    row(ui, "tone map", |ui| named(ui, "tone map", &mut choices.tone_map, &ToneMap::ALL, ToneMap::name));
+    row(ui, "kernel", |ui| named(ui, "kernel", &mut view.kernel, &Kernel::ALL, Kernel::name));
+    row(ui, "visibility", |ui| {
+        named(ui, "visibility", &mut view.visibility, Visibility::ALL, Visibility::name);
+    });
+    if view.visibility == Visibility::Rays {
+        row(ui, "rays per pixel", |ui| {
+            let text = |n: f64, _: std::ops::RangeInclusive<usize>| match n {
+                n if n < 1.0 => "one to each".to_owned(),
+                n => format!("{n}"),
+            };
+            ui.add(Slider::new(&mut view.rays_per_pixel, 0..=256).custom_formatter(text));
+        });
+    }
+    row(ui, "accumulation", |ui| {
+        named(ui, "accumulation", &mut view.accumulation, Accumulation::ALL, Accumulation::name);
+    });
+    if view.accumulation == Accumulation::Tiled {
+        row(ui, "interleave", |ui| {
+            ui.horizontal(|ui| {
+                for n in [1, 2, 4] {
+                    ui.selectable_value(&mut view.interleave, n, n.to_string());
+                }
+            });
+        });
+    }
+    row(ui, "light range ε", |ui| {
+        let slider = Slider::new(&mut view.epsilon, 0.0..=1.0).logarithmic(true).smallest_positive(1e-8);
+        ui.add(slider.custom_formatter(|e, _| if e > 0.0 { format!("{e:.1e}") } else { "unlimited".into() }));
+    });
+    row(ui, "shadows", |ui| named(ui, "shadows", &mut view.shadows, Shadows::ALL, Shadows::name));
+    row(ui, "light samples", |ui| {
+        ui.add(Slider::new(&mut view.light_samples, 1..=64).logarithmic(true));
+    });
+    row(ui, "only light", |ui| {
+        let named = (0u32..).zip(&scene.lights).map(|(id, light)| (Some(id), light.name.clone()));
+        let names: Vec<_> = std::iter::once((None, "all".to_owned())).chain(named).collect();
+        let now =
+            names.iter().find(|(id, _)| *id == view.only_light).map_or("all".into(), |(_, n)| n.clone());
+        combo(ui, "only light", &mut view.only_light, names, now);
+    });
+}
+
+fn row(ui: &mut Ui, label: &str, add: impl FnOnce(&mut Ui)) {
+    ui.label(label);
+    add(ui);
+    ui.end_row();
+}
+
+fn combo<T: PartialEq>(ui: &mut Ui, id: &str, value: &mut T, names: Vec<(T, String)>, now: String) {
+    ComboBox::from_id_salt(id).selected_text(now).show_ui(ui, |ui| {
+        for (candidate, name) in names {
+            ui.selectable_value(value, candidate, name);
+        }
+    });
+}
+
+fn named<T: PartialEq + Copy>(ui: &mut Ui, id: &str, value: &mut T, all: &[T], name: fn(T) -> &'static str) {
+    let now = name(*value).to_owned();
+    combo(ui, id, value, all.iter().map(|&v| (v, name(v).to_owned())).collect(), now);
+}

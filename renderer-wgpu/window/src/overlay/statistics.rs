@@ -1,0 +1,88 @@
+//! Turns a frame's counters and what its picture took into lines of text.
+
+use super::{Machine, alarm, right, window};
+use crate::session::{Effort, Session};
+use egui::{Context, Grid, RichText, Ui, pos2};
+
+pub(super) fn show(ctx: &Context, session: &Session, machine: &Machine) {
+    window("Figures", pos2(right(ctx) - 250.0, 8.0)).default_width(234.0).show(ctx, |ui| {
+        ui.label(RichText::new(&machine.adapter).small());
+        if machine.is_software {
+            alarm(ui, "software rendering: slow");
+        }
+        Grid::new("figures").num_columns(2).show(ui, |ui| {
+            for (label, value) in lines(session) {
+                ui.label(label);
+                ui.monospace(value);
+                ui.end_row();
+            }
+        });
+        passes(ui, &session.effort);
+    });
+}
+
+fn lines(session: &Session) -> Vec<(&'static str, String)> {
+    let (width, height) = session.size;
+    let mut lines = vec![
+        ("picture", format!("{width}×{height}")),
+        ("frame time", format!("{:.1} ms", session.effort.frame_ms)),
+    ];
+    if let Some(published) = &session.published {
+        let frame = &published.frame;
+        let statistics = &frame.statistics;
+        let state = if statistics.converged != 0 {
+            "converged".to_owned()
+        } else {
+            format!("{:.0} % stale", 100.0 * statistics.stale_share)
+        };
+        lines.extend([
+            ("VSLs", frame.vsls.len().to_string()),
+            ("photons/s", short(statistics.paths_per_s)),
+            ("rays/s", short(statistics.rays_per_s)),
+            ("light", state),
+            ("published frame", frame.frame.to_string()),
+        ]);
+    }
+    if session.latency.is_known() {
+        lines.push(("change → published", format!("{:.1} ms", session.latency.published_ms)));
+        lines.push(("published → shown", format!("{:.1} ms", session.latency.shown_ms)));
+    }
+    lines
+}
+
+fn passes(ui: &mut Ui, effort: &Effort) {
+    if effort.passes.is_empty() {
+        return;
+    }
+    ui.separator();
+    Grid::new("passes").num_columns(2).show(ui, |ui| {
+        for pass in &effort.passes {
+            ui.label(pass.name);
+            ui.monospace(format!("{:.2} ms", pass.ms));
+            ui.end_row();
+        }
+    });
+}
+
+/// Three digits and a unit: 1.23 M.
+fn short(x: f64) -> String {
+    for (unit, size) in [(" G", 1e9), (" M", 1e6), (" k", 1e3)] {
+        if x >= size {
+            return format!("{:.*}{unit}", if x / size < 10.0 { 2 } else { 1 }, x / size);
+        }
+    }
+    format!("{x:.0}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_short() {
+        assert_eq!(
+            [0.0, 999.0, 1234.0, 56_789.0, 1.5e6, 3e9].map(short),
+            ["0", "999", "1.23 k", "56.8 k", "1.50 M", "3.00 G"]
+        );
+    }
+}
