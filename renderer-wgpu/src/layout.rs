@@ -182,6 +182,33 @@ shared! {
         pad_2: u32,
     }
 
+    /// Twin of `RaysDispatch` in rays_pixel.wgsl.
+    RaysDispatch as "RaysDispatch" {
+        lo: [f32; 3],
+        end: u32,
+        hi: [f32; 3],
+        items: u32,
+        first_row: u32,
+        rows: u32,
+        sample: u32,
+        budget: u32,
+    }
+
+    /// Twin of `PixelRays` in rays_pixel.wgsl.
+    PixelRays as "PixelRays" {
+        sum_a: [f32; 3],
+        next: u32,
+        sum_b: [f32; 3],
+        suspended: u32,
+        total: f32,
+        running: f32,
+        taken_a: u32,
+        taken_b: u32,
+        weight_a: f32,
+        weight_b: f32,
+        group: [u32; 2],
+    }
+
     /// Twin of `ShadowView` in shadow.wgsl.
     ShadowView as "ShadowView" {
         clip_from_world: [[f32; 4]; 4],

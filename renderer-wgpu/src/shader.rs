@@ -15,6 +15,9 @@ const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
+const RAYS_WALK: &str = include_str!("../wgsl/rays_walk.wgsl");
+const RAYS_PIXEL: &str = include_str!("../wgsl/rays_pixel.wgsl");
+
 macro_rules! sources {
     ($($constant:ident = $file:literal [$($part:expr),*];)*) => {
         $(pub(crate) const $constant: Source = Source {
@@ -43,6 +46,13 @@ sources! {
     OWNER = "owner" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
     COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     DISC = "disc" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
+    RAYS_DIRECT = "rays_direct" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_WALK, RAYS_PIXEL
+    ];
+    RAYS_INDIRECT = "rays_indirect" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, FRAME, VSL, RAYS_WALK, RAYS_PIXEL
+    ];
+    RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_WALK, RAYS_PIXEL];
     PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];
 }
 
@@ -51,6 +61,7 @@ impl Source {
     pub(crate) fn text(&self) -> String {
         let mut text = wgsl::constants();
         text.push_str(&layout::constants());
+        text.push_str(&crate::rays::constants());
         for part in self.parts {
             text.push_str(part);
             text.push('\n');

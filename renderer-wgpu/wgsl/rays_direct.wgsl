@@ -1,0 +1,101 @@
+// Turns lights into the irradiance that reaches each pixel straight from them, by shadow rays as on the CPU.
+
+@group(0) @binding(1) var gbuffer: texture_2d<u32>;
+@group(0) @binding(2) var<storage, read> lights: array<Light>;
+@group(0) @binding(3) var irradiance: texture_storage_2d<rgba32float, write>;
+
+// A ray that decides over some irradiance.
+struct Question {
+    direction: vec3f,
+    t_max: f32,
+    arriving: vec3f,
+    asked: bool,             // whether there is anything to decide
+}
+
+// Items: each light once, those of a point and directional ones; then each sample, of each area light.
+@compute @workgroup_size(8, 8)
+fn trace_direct(@builtin(global_invocation_id) id: vec3u) {
+    if !is_in_band(id.xy) {
+        return;
+    }
+    let slot = pixel_slot(id.xy);
+    var state = pixels[slot];
+    if state.next > rays.items {
+        return;
+    }
+    let pixel = vec2u(id.x, rays.first_row + id.y);
+    let word = textureLoad(gbuffer, pixel, 0);
+    if !surface_is_there(word) {
+        textureStore(irradiance, pixel, vec4f(0.0));
+        pixels[slot].next = rays.items + 1u;
+        return;
+    }
+    let surface = surface_unpack(word, pixel);
+    let origin = pixel_ray_origin(surface, pixel);
+    let sequence = sobol_sequence(frame.seed_low ^ LIGHT_SEED_LOW, frame.seed_high ^ LIGHT_SEED_HIGH, pixel.y * frame.size.x + pixel.x);
+    var traced = 0u;
+    while state.next < rays.end && walk_turns < RAY_TURNS_FOR_NEW {
+        walk_turns += 2u;
+        var index = state.next;
+        var u = vec2f(0.5);
+        let is_sample = index >= frame.lights;
+        if is_sample {
+            let number = (index - frame.lights) / frame.lights;
+            index = (index - frame.lights) % frame.lights;
+            if index == 0u && state.suspended == 0u {
+                state.taken_a = 0u;
+            }
+            var sample = sobol_sample(sequence, rays.sample * frame.light_samples + number);
+            sample.dimension = state.taken_a;
+            u = sobol_2d(sample);
+        }
+        let light = lights[index];
+        let of_this_kind = (light.kind >= LIGHT_PARALLELOGRAM) == is_sample;
+        if of_this_kind && (frame.only_light == ALL_LIGHTS || frame.only_light == index) {
+            let question = ask(light, surface, origin, u);
+            if question.asked {
+                if state.suspended == 0u {
+                    walk_begin();
+                    traced += 1u;
+                } else {
+                    pixel_resume(state, slot);
+                    state.suspended = 0u;
+                }
+                let answer = walk(ray_frame(origin, question.direction, question.t_max, rays.lo, rays.hi));
+                if answer == WALK_SUSPENDED {
+                    pixel_suspend(slot);
+                    state.suspended = walk_depth + 1u;
+                    state.group = walk_group;
+                    break;
+                }
+                if answer == WALK_MISS {
+                    if is_sample {
+                        state.sum_b += question.arriving;
+                    } else {
+                        state.sum_a += question.arriving;
+                    }
+                }
+            }
+        }
+        if of_this_kind && is_sample {
+            state.taken_a += 1u;
+        }
+        state.next += 1u;
+    }
+    atomicAdd(&counts[1], traced);
+    if state.next >= rays.items {
+        textureStore(irradiance, pixel, vec4f(state.sum_a + state.sum_b / f32(frame.light_samples), 0.0));
+        state.next = rays.items + 1u;
+    } else {
+        atomicAdd(&counts[0], 1u);
+    }
+    pixels[slot] = state;
+}
+
+fn ask(light: Light, surface: Surface, origin: vec3f, u: vec2f) -> Question {
+    let reached = light_illuminate(light, origin, u);
+    let cos_theta = dot(surface.normal, reached.wi);
+    let arriving = light.power * (reached.irradiance * cos_theta);
+    let asked = cos_theta > 0.0 && reached.irradiance > 0.0 && any(light.power != vec3f(0.0));
+    return Question(reached.wi, reached.distance * SHADOW_REACH, arriving, asked);
+}
