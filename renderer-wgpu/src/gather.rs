@@ -116,12 +116,7 @@ impl Gather {
             Accumulation::Splat | Accumulation::Forward => {
                 // The lists are not used for the picture, but say what the range loses.
                 if gathering.ranged {
-                    let span = scope.timer.span("light lists");
-                    let batches = lights.batches();
-                    for batch in 0..batches {
-                        let edge = Edge { span, first: batch == 0, last: batch + 1 == batches };
-                        self.encode_selection(scope, targets, lights, batch, edge);
-                    }
+                    self.encode_selections(scope, targets, lights);
                 }
                 self.encode_additive(scope, targets, geometry, lights, gathering, sees);
             }
@@ -134,6 +129,27 @@ impl Gather {
     pub(crate) fn skipped(&self, gpu: &Gpu) -> Result<f64, GpuError> {
         let tallies: Vec<[f32; 2]> = readback::buffer(gpu, &self.tallies)?;
         Ok(tallies.iter().map(|t| f64::from(t[0])).sum())
+    }
+
+    /// Finds what the range of the lights loses, for a picture whose light is summed elsewhere.
+    pub(crate) fn encode_loss(
+        &self,
+        scope: &mut Scope<'_>,
+        targets: &Targets,
+        geometry: &Geometry,
+        lights: &VslBuffer,
+    ) {
+        self.encode_bounds(scope, targets, geometry);
+        self.encode_selections(scope, targets, lights);
+    }
+
+    fn encode_selections(&self, scope: &mut Scope<'_>, targets: &Targets, lights: &VslBuffer) {
+        let span = scope.timer.span("light lists");
+        let batches = lights.batches();
+        for batch in 0..batches {
+            let edge = Edge { span, first: batch == 0, last: batch + 1 == batches };
+            self.encode_selection(scope, targets, lights, batch, edge);
+        }
     }
 
     fn prepare(&mut self, gpu: &Gpu, gathering: Gathering) -> Result<(), GpuError> {

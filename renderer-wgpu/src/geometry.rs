@@ -17,7 +17,7 @@ pub(crate) struct Geometry {
     pub(crate) objects: wgpu::Buffer,
     object_table: Vec<ObjectUniform>,
     parts: Vec<Part>,
-    source: Arc<photonstream_scene::Geometry>,
+    pub(crate) source: Arc<photonstream_scene::Geometry>,
     /// Number of corners that the buffer holds.
     count: u32,
 }

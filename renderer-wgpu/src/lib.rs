@@ -13,7 +13,6 @@ mod owners;
 mod picture;
 mod pipelines;
 mod present;
-#[cfg_attr(not(test), allow(dead_code))]
 mod rays;
 mod readback;
 mod renderer;

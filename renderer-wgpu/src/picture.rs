@@ -6,7 +6,7 @@ use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
     FrameRenderer, LayerKind, RenderError, RenderOptions, RenderStats, Rendered, Watch,
 };
-use photonstream_scene::Scene;
+use photonstream_scene::{Scene, Visibility};
 use photonstream_shading::sobol::Sequence;
 use std::time::Instant;
 
@@ -160,7 +160,13 @@ impl FrameRenderer for WgpuRenderer {
                 Sequence::new(options.seed, 0).sample(sample.into()).next_2d()
             };
             for (index, &layer) in options.layers.iter().enumerate() {
-                let drawn = self.renderer.draw(&View { show: Show::Layer(layer), jitter, ..view })?;
+                let shown = View { show: Show::Layer(layer), jitter, sample, ..view };
+                let drawn = self.renderer.draw_watched(&shown, watch)?;
+                if drawn.stopped {
+                    return Err(RenderError::Cancelled);
+                }
+                stats.light_rays += drawn.light_rays;
+                stats.vsl_rays += drawn.vsl_rays;
                 self.passes.extend(drawn.passes);
                 let pixels = self.renderer.pixels()?;
                 match layers.get_mut(index) {
@@ -172,7 +178,12 @@ impl FrameRenderer for WgpuRenderer {
             if options.needs(LayerKind::needs_indirect) && options.epsilon > 0.0 {
                 let skipped = self.renderer.skipped()?;
                 if skipped > 0.0 {
-                    self.renderer.draw(&View { show: Show::Layer(LayerKind::Indirect), jitter, ..view })?;
+                    self.renderer.draw(&View {
+                        show: Show::Layer(LayerKind::Indirect),
+                        jitter,
+                        sample,
+                        ..view
+                    })?;
                     indirect_sum +=
                         self.renderer.pixels()?.iter().map(|p| f64::from(p.max_element())).sum::<f64>();
                     stats.range_loss_share += skipped;
@@ -189,6 +200,15 @@ impl FrameRenderer for WgpuRenderer {
         }
         stats.range_loss_share = if indirect_sum > 0.0 { stats.range_loss_share / indirect_sum } else { 0.0 };
         self.warn()?;
+        let by_rays = options.needs(LayerKind::needs_indirect) && options.visibility == Visibility::Rays;
+        stats.noise = if by_rays { self.renderer.noise()? } else { None };
+        if let Some(noise) = stats.noise.filter(|&noise| noise > 0.0) {
+            tracing::info!(
+                "{} shadow rays per pixel leave a standard error of {:.2} % of the indirect light; --rays sets the number",
+                self.choices.rays_per_pixel,
+                noise * 100.0
+            );
+        }
         if self.choices.timed {
             tracing::info!("{}", times(&self.passes));
         }

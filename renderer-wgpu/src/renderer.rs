@@ -9,6 +9,7 @@ use crate::{
     openness::{self, Openness},
     owners::Owners,
     present::Present,
+    rays::{RayInputs, Rays, Traced},
     scope::Scope,
     shadow_maps::ShadowMaps,
     shadow_views::LightTable,
@@ -19,7 +20,7 @@ use crate::{
 };
 use glam::Vec3;
 use photonstream_protocol::VslFrame;
-use photonstream_renderer::LayerKind;
+use photonstream_renderer::{LayerKind, Watch};
 use photonstream_scene::{Features, Scene, SceneLight, Visibility};
 use photonstream_shading::{Camera, light::Bounds};
 
@@ -32,6 +33,12 @@ pub struct Drawn {
     pub passes: Vec<PassTime>,
     /// Objects that the camera may see, if the G-buffer was drawn.
     pub objects_drawn: u32,
+    /// Shadow rays to lights.
+    pub light_rays: u64,
+    /// Shadow rays to virtual surface lights.
+    pub vsl_rays: u64,
+    /// Whether the caller stopped it: the picture is not complete.
+    pub stopped: bool,
 }
 
 /// A renderer on one device, for one picture at a time.
@@ -47,6 +54,7 @@ pub struct Renderer {
     deferred: Deferred,
     gather: Gather,
     openness: Option<Openness>,
+    rays: Option<Rays>,
     owners: Owners,
     pub(crate) targets: Option<Targets>,
     timer: Timer,
@@ -85,6 +93,7 @@ impl Renderer {
             deferred: Deferred::new(&gpu),
             gather: Gather::new(&gpu),
             openness: None,
+            rays: None,
             owners: Owners::new(&gpu),
             targets: None,
             timer: Timer::new(&gpu),
@@ -167,16 +176,24 @@ impl Renderer {
     /// # Errors
     /// [`GpuError`]: an option out of range or not possible on this device, too large a picture, a failed device.
     pub fn draw(&mut self, view: &View) -> Result<Drawn, GpuError> {
+        self.draw_watched(view, Watch::default())
+    }
+
+    /// [`Renderer::draw`], which `watch` can stop between two dispatches of shadow rays.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn draw_watched(&mut self, view: &View, watch: Watch<'_>) -> Result<Drawn, GpuError> {
         view.validate()?;
         self.gpu.check()?;
-        let result = self.draw_changes(view);
-        if result.is_err() {
+        let result = self.draw_changes(view, watch);
+        if result.as_ref().map_or(true, |drawn| drawn.stopped) {
             self.done.forget();
         }
         result
     }
 
-    fn draw_changes(&mut self, view: &View) -> Result<Drawn, GpuError> {
+    fn draw_changes(&mut self, view: &View, watch: Watch<'_>) -> Result<Drawn, GpuError> {
         let Some(scene) = &self.scene else { return Ok(Drawn::default()) };
         let size = [view.width, view.height];
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
@@ -215,8 +232,26 @@ impl Renderer {
             if with_maps && (new_views || done.is_stale(Stage::GBuffer, view, versions)) {
                 self.maps.encode(scope.gpu, &mut scope.encoder, &scene.geometry, scope.timer);
             }
-            let kind = DirectKind::of(&scene.features, with_maps);
-            self.deferred.encode_direct(&mut scope, targets, &self.maps, kind);
+            if view.shadows == Shadows::Rays {
+                let rays = prepared(&mut self.rays, &self.gpu, &scene.geometry)?;
+                let inputs = RayInputs {
+                    frame: scope.frame,
+                    gbuffer: &targets.gbuffer.view,
+                    size,
+                    lights: &self.maps.lights,
+                    count: scene.lights.len() as u32,
+                    sample: view.sample,
+                    output: &targets.direct.view,
+                    watch,
+                };
+                let traced =
+                    rays.encode_direct(scope.gpu, &mut scope.encoder, &inputs, view.light_samples)?;
+                drawn.light_rays = traced.rays;
+                drawn.take(traced, "direct light, rays");
+            } else {
+                let kind = DirectKind::of(&scene.features, with_maps);
+                self.deferred.encode_direct(&mut scope, targets, &self.maps, kind);
+            }
         }
         let lights_needed = view.needs_indirect() || view.needs_owner() || view.show == Show::Discs;
         if lights_needed && done.is_stale(Stage::Unpack, view, versions) {
@@ -224,12 +259,35 @@ impl Renderer {
             done.set(Stage::Unpack, view, versions);
         }
         if view.needs_indirect() && done.is_stale(Stage::Indirect, view, versions) {
-            let gathering = Gathering {
-                accumulation: view.accumulation,
-                ranged: view.epsilon > 0.0,
-                interleave: view.interleave,
-            };
-            self.gather.encode(&mut scope, targets, &scene.geometry, &self.vsls, gathering, sees)?;
+            let ranged = view.epsilon > 0.0;
+            let by_rays = view.visibility == Visibility::Rays;
+            if by_rays && !drawn.stopped {
+                if ranged {
+                    self.gather.encode_loss(&mut scope, targets, &scene.geometry, &self.vsls);
+                }
+                let rays = prepared(&mut self.rays, &self.gpu, &scene.geometry)?;
+                let inputs = RayInputs {
+                    frame: scope.frame,
+                    gbuffer: &targets.gbuffer.view,
+                    size,
+                    lights: &self.vsls.lights,
+                    count: self.vsls.count,
+                    sample: view.sample,
+                    output: &targets.indirect.view,
+                    watch,
+                };
+                if view.sample == 0 {
+                    rays.restart_noise();
+                }
+                let traced =
+                    rays.encode_indirect(scope.gpu, &mut scope.encoder, &inputs, view.rays_per_pixel)?;
+                drawn.vsl_rays = traced.rays;
+                drawn.take(traced, "indirect light, rays");
+            } else if !by_rays {
+                let (accumulation, interleave) = (view.accumulation, view.interleave);
+                let gathering = Gathering { accumulation, ranged, interleave };
+                self.gather.encode(&mut scope, targets, &scene.geometry, &self.vsls, gathering, sees)?;
+            }
             done.set(Stage::Indirect, view, versions);
         }
         let occluded = view.needs_indirect() && view.visibility == Visibility::Ao;
@@ -265,7 +323,7 @@ impl Renderer {
         }
         done.set(Stage::Output, view, versions);
         if self.timed {
-            drawn.passes = self.timer.read(&self.gpu)?;
+            drawn.passes.extend(self.timer.read(&self.gpu)?);
         }
         self.gpu.check()?;
         Ok(drawn)
@@ -284,6 +342,15 @@ impl Renderer {
         self.gather.skipped(&self.gpu)
     }
 
+    /// Standard error of the indirect light of the last picture as rel. RMSE, where shadow rays went to some of the
+    /// virtual surface lights only: 0 where they went to all, `None` where there were no rays or one for each pixel.
+    ///
+    /// # Errors
+    /// A failed device.
+    pub fn noise(&self) -> Result<Option<f64>, GpuError> {
+        self.rays.as_ref().map_or(Ok(None), |rays| rays.noise(&self.gpu))
+    }
+
     /// Number of published records that are not shown because a value is not finite, negative or beyond all reason;
     /// waits for the device.
     ///
@@ -292,6 +359,24 @@ impl Renderer {
     pub fn refused_records(&self) -> Result<u32, GpuError> {
         self.vsls.refused(&self.gpu)
     }
+}
+
+impl Drawn {
+    fn take(&mut self, traced: Traced, name: &'static str) {
+        self.passes.push(PassTime { name, ms: traced.ms });
+        self.stopped |= traced.stopped;
+    }
+}
+
+/// The shadow rays of the scene on the device.
+fn prepared<'a>(
+    rays: &'a mut Option<Rays>,
+    gpu: &Gpu,
+    geometry: &Geometry,
+) -> Result<&'a mut Rays, GpuError> {
+    let rays = rays.get_or_insert_with(|| Rays::new(gpu));
+    rays.set_geometry(gpu, &geometry.source)?;
+    Ok(rays)
 }
 
 fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUniform {

@@ -79,6 +79,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
         show: Show::Layer(LayerKind::Full),
         only_light: None,
         jitter: [0.0; 2],
+        sample: 0,
         seed: 0,
     };
     let seen = View { camera: view.camera, jitter: view.jitter, ..base };
@@ -87,8 +88,8 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
     match stage {
         Stage::GBuffer => Key { view: seen, versions: shape },
         Stage::Direct => {
-            let View { shadows, light_samples, only_light, .. } = *view;
-            let view = View { shadows, light_samples, only_light, seed, ..seen };
+            let View { shadows, light_samples, only_light, sample, .. } = *view;
+            let view = View { shadows, light_samples, only_light, sample, seed, ..seen };
             Key { view, versions: Versions { lights: versions.lights, ..shape } }
         }
         // The range depends on the largest albedo.
@@ -106,6 +107,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
                 interleave: view.interleave,
                 visibility: if rays { Visibility::Rays } else { Visibility::None },
                 rays_per_pixel: if rays { view.rays_per_pixel } else { 0 },
+                sample: if rays { view.sample } else { 0 },
                 seed: if rays { seed } else { 0 },
                 ..seen
             };

@@ -111,6 +111,8 @@ pub struct View {
     pub only_light: Option<u32>,
     /// Place of the sample within its pixel; (0.5, 0.5) is the centre.
     pub jitter: [f32; 2],
+    /// Number of the camera sample, from 0: each has samples of lights of its own.
+    pub sample: u32,
     /// Seed of pixel and area-light samples.
     pub seed: u64,
 }
@@ -133,6 +135,7 @@ impl View {
             show: Show::Layer(LayerKind::Full),
             only_light: None,
             jitter: [0.5; 2],
+            sample: 0,
             seed: 1,
         }
     }

@@ -22,7 +22,7 @@ use dispatch::{Pass, Workspace};
 use glam::Vec3;
 use noise::Noise;
 use photonstream_renderer::Watch;
-use photonstream_scene::{Geometry, Scene};
+use photonstream_scene::Geometry;
 use std::sync::Arc;
 use tree::Tree;
 
@@ -153,17 +153,17 @@ impl Rays {
         }
     }
 
-    /// Traces against `scene` from now on; its tree is built only when its geometry has changed.
+    /// Traces against `geometry` from now on; its tree is built only when it has changed.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] for more triangles than a binding holds, or a tree deeper than a ray's stack.
-    pub(crate) fn set_geometry(&mut self, gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
+    pub(crate) fn set_geometry(&mut self, gpu: &Gpu, geometry: &Arc<Geometry>) -> Result<(), GpuError> {
         let known = self.source.as_ref();
-        if known.is_some_and(|g| Arc::ptr_eq(g, &scene.geometry) || **g == *scene.geometry) {
-            self.source = Some(Arc::clone(&scene.geometry));
+        if known.is_some_and(|g| Arc::ptr_eq(g, geometry) || **g == **geometry) {
+            self.source = Some(Arc::clone(geometry));
             return Ok(());
         }
-        let tree = Tree::new(&scene.geometry);
+        let tree = Tree::new(geometry);
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let remedy = "choose --visibility none and --shadows maps, or --renderer cpu";
@@ -179,7 +179,7 @@ impl Rays {
         self.nodes = upload(gpu, "ray-tracing nodes", bytemuck::cast_slice(&tree.nodes));
         self.triangles = upload(gpu, "ray-tracing triangles", bytemuck::cast_slice(&tree.triangles));
         self.bounds = tree.bounds;
-        self.source = Some(Arc::clone(&scene.geometry));
+        self.source = Some(Arc::clone(geometry));
         self.workspace = None;
         Ok(())
     }

@@ -86,7 +86,7 @@ impl Picture {
         gpu.queue.write_texture(copied, bytemuck::cast_slice(&words), row, gbuffer.texture.size());
         let usage = TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC;
         let mut rays = Rays::new(gpu);
-        rays.set_geometry(gpu, scene).unwrap();
+        rays.set_geometry(gpu, &scene.geometry).unwrap();
         let bytes = size_of::<FrameUniform>() as u64;
         let frame_buffer = buffer(gpu, "frame", bytes, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let output = Target::new(gpu, "irradiance", size, HDR, usage);

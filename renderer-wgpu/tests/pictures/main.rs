@@ -1,5 +1,10 @@
 //! Pictures of the GPU renderer against those of the CPU from the same published frame, and against each other.
 #![allow(clippy::unwrap_used)]
 
+mod accumulations;
 mod against_cpu;
+mod approximations;
+mod extremes;
+mod only_what_changed;
 mod scenes;
+mod twins;

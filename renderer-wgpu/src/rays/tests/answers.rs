@@ -14,7 +14,7 @@ const ANSWERS: Source = Source {
 /// Answers of the device, and the seconds that it took after a first round.
 fn device(gpu: &Gpu, scene: &Scene, queries: &[Ray], timed: bool) -> (Vec<bool>, f64) {
     let mut rays = Rays::new(gpu);
-    rays.set_geometry(gpu, scene).unwrap();
+    rays.set_geometry(gpu, &scene.geometry).unwrap();
     let words: Vec<[f32; 8]> = queries
         .iter()
         .map(|r| {
