@@ -17,6 +17,7 @@ mod frame;
 mod heartbeat;
 mod layout;
 mod local_socket;
+mod mapped_segment;
 mod mapping;
 mod process;
 mod publisher;
@@ -43,6 +44,7 @@ pub use control::{ControlClient, ControlServer, Incoming, Replier, Reply, Reques
 pub use error::ProtocolError;
 pub use frame::VslFrame;
 pub use layout::{ABI_MAJOR, ABI_MINOR, ENDIAN_TAG, MAGIC, SegmentSpec};
+pub use mapped_segment::{MappedFrame, MappedSegment};
 pub use process::monotonic_ns;
 pub use publisher::{FrameSource, Publisher};
 pub use reader_segment::AccessMode;

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 
 use rustix::fs::{Mode, OFlags};
@@ -12,6 +13,7 @@ use rustix::shm;
 use crate::claim::is_segment_name;
 use crate::error::ProtocolError;
 use crate::layout::{Layout, state, word};
+use crate::mapped_segment::MappedSegment;
 use crate::mapping::ReaderMapping;
 use crate::process::monotonic_ns;
 use crate::runtime::{ChannelDir, Current, check_file};
@@ -57,7 +59,7 @@ fn read_words(file: &File, at: usize, into: &mut [u64]) -> Result<(), ProtocolEr
 const ORPHANED_AFTER_NS: u64 = 5_000_000_000;
 
 enum Access {
-    Mapped(ReaderMapping),
+    Mapped(Arc<ReaderMapping>),
     Strict(FileWords),
 }
 
@@ -104,7 +106,8 @@ impl ReaderSegment {
         let access = match mode {
             AccessMode::Mapped => {
                 let mapping = ReaderMapping::open(&file, length);
-                Access::Mapped(mapping.map_err(|error| ProtocolError::io("map", path, error))?)
+                let mapping = mapping.map_err(|error| ProtocolError::io("map", path, error))?;
+                Access::Mapped(Arc::new(mapping))
             }
             AccessMode::Strict => Access::Strict(FileWords { file, words: length / 8 }),
         };
@@ -140,6 +143,14 @@ impl ReaderSegment {
         match &self.access {
             Access::Mapped(mapping) => Words::Mapped(mapping.words()),
             Access::Strict(file) => Words::Strict(file),
+        }
+    }
+
+    /// The map itself, for devices; `None` where the segment is read without one.
+    pub(crate) fn mapped(&self) -> Option<MappedSegment> {
+        match &self.access {
+            Access::Mapped(mapping) => Some(MappedSegment::new(Arc::clone(mapping), self.layout.clone())),
+            Access::Strict(_) => None,
         }
     }
 

@@ -7,6 +7,7 @@ use crate::error::ProtocolError;
 use crate::frame::{FramePair, VslFrame};
 use crate::layout::{state, word};
 use crate::local_socket::{Lifeline, SOCKET};
+use crate::mapped_segment::MappedSegment;
 use crate::process::monotonic_ns;
 use crate::reader_segment::{AccessMode, ReaderSegment, Words};
 use crate::ring_read::{Head, Outcome, RingReader};
@@ -282,6 +283,12 @@ impl Subscriber {
     /// Bytes of the attached segment.
     pub fn segment_bytes(&self) -> u64 {
         self.segment.layout.bytes
+    }
+
+    /// The map of the attached segment, for devices that copy from it by themselves; `None` with
+    /// [`AccessMode::Strict`]. Another one is followed by `read` and `wait`: compare the epochs.
+    pub fn mapped(&self) -> Option<MappedSegment> {
+        self.segment.mapped()
     }
 
     fn has_new(&self) -> bool {

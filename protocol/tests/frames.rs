@@ -74,6 +74,33 @@ fn changed_chunks_are_exact() {
     }
 }
 
+/// Devices copy from the map by themselves: they are told where the newest frame lies, and whether it is still there.
+/// Frames 1 to 6 in three slots; frame f is overwritten by frame f + 3, and by none before.
+#[test]
+fn a_mapped_frame_holds_until_its_slot_is_written_again() {
+    let (_root, runtime, channel, mut publisher) = start(1000);
+    let strict = Subscriber::attach_in(&runtime, &channel, AccessMode::Strict).unwrap();
+    assert!(strict.mapped().is_none(), "nothing is mapped");
+    let mapped = Subscriber::attach_in(&runtime, &channel, AccessMode::Mapped).unwrap().mapped().unwrap();
+    assert_eq!((mapped.vsl_capacity(), mapped.bytes() % 4096), (1000, 0));
+    assert_eq!(mapped.address().addr() % 4096, 0);
+    assert_eq!(mapped.newest().unwrap(), None);
+    let (mut content, mut frames) = (Content::default(), Vec::new());
+    for frame in 1..=6 {
+        content.advance(1000 - frame as usize, frame);
+        publisher.publish(&content.source(true)).unwrap();
+        let newest = mapped.newest().unwrap().unwrap();
+        assert_eq!((newest.frame, newest.vsl_count), (frame, 1000 - frame as u32));
+        assert!(newest.vsl_offset.is_multiple_of(64) && newest.vsl_offset + 64_000 <= mapped.bytes());
+        frames.push(newest);
+        for (f, place) in (1..).zip(&frames) {
+            assert_eq!(mapped.holds(place).unwrap(), f + 3 > frame, "frame {f} after frame {frame}");
+        }
+    }
+    drop(publisher);
+    assert!(mapped.holds(&frames[5]).unwrap(), "the map outlives publisher and subscriber");
+}
+
 /// Three readers under a writer that never pauses, 1 s: each frame they get is whole, and they get many.
 #[test]
 fn nothing_is_torn_in_a_storm() {
