@@ -54,7 +54,18 @@ impl Gpu {
     pub fn headless(choice: &AdapterChoice) -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.flags = instance_flags();
-        Self::open(wgpu::Instance::new(descriptor), None, choice)
+        Self::open(wgpu::Instance::new(descriptor), None, choice, request)
+    }
+
+    /// The same, with a device that `request` makes of an adapter, or its reason why it does not.
+    #[cfg(all(feature = "import", unix))]
+    pub(crate) fn headless_by(
+        choice: &AdapterChoice,
+        request: impl Fn(&wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), String>,
+    ) -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        descriptor.flags = instance_flags();
+        Self::open(wgpu::Instance::new(descriptor), None, choice, request)
     }
 
     /// A device of `instance` that can show pictures on `surface`.
@@ -66,13 +77,14 @@ impl Gpu {
         surface: &wgpu::Surface<'_>,
         choice: &AdapterChoice,
     ) -> Result<Self, GpuError> {
-        Self::open(instance, Some(surface), choice)
+        Self::open(instance, Some(surface), choice, request)
     }
 
     fn open(
         instance: wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
         choice: &AdapterChoice,
+        request: impl Fn(&wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), String>,
     ) -> Result<Self, GpuError> {
         // GL is left out: it reads no depth textures and has no float targets here.
         let backends = wgpu::Backends::PRIMARY;
@@ -89,7 +101,7 @@ impl Gpu {
             let info = adapter.get_info();
             let result = match unsuitable(&adapter, &info, surface, choice) {
                 Some(reason) => Err(reason),
-                None => request(&adapter).map_err(|error| error.to_string()),
+                None => request(&adapter),
             };
             match result {
                 Ok((device, queue)) => {
@@ -190,8 +202,8 @@ fn unsuitable(
     }
 }
 
-fn request(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), wgpu::RequestDeviceError> {
-    pollster::block_on(adapter.request_device(&descriptor(adapter)))
+fn request(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), String> {
+    pollster::block_on(adapter.request_device(&descriptor(adapter))).map_err(|error| error.to_string())
 }
 
 /// What is asked of a device of `adapter`: all optional features that it has, and all its limits.

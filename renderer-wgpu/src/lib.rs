@@ -7,6 +7,8 @@ mod error;
 mod gather;
 mod geometry;
 mod gpu;
+#[cfg(all(feature = "import", unix))]
+mod import;
 mod layout;
 mod openness;
 mod owners;
@@ -29,6 +31,8 @@ mod vsl_buffer;
 
 pub use error::GpuError;
 pub use gpu::{AdapterChoice, Gpu, UNIFORM_BLOCK_BYTES, instance_flags};
+#[cfg(all(feature = "import", unix))]
+pub use import::{ImportError, ImportedSegment};
 pub use picture::{Choices, WgpuRenderer};
 pub use renderer::{Drawn, Renderer};
 pub use timer::PassTime;

@@ -173,7 +173,6 @@ fn odd_sets_of_triangles_make_sound_trees() {
 /// `cargo test --release -p photonstream-renderer-wgpu --lib -- --ignored --nocapture rays_per_second`
 #[test]
 #[ignore = "measures"]
-#[expect(clippy::print_stdout, reason = "a measurement")]
 fn rays_per_second() {
     let Some(gpu) = gpu() else { return };
     for name in ["cornell-box.toml", "cornell-knot.toml"] {
