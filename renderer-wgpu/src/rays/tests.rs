@@ -11,7 +11,7 @@ use crate::{
 };
 use glam::Vec2;
 use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet};
-use photonstream_scene::{RenderSettings, SceneConfig, Side, Visibility, bvh::Ray};
+use photonstream_scene::{RenderSettings, Scene, SceneConfig, Side, Visibility, bvh::Ray};
 use photonstream_shading::{Camera, Kernel, kernel, octahedral, sampling, sobol::Sequence, surface};
 use std::path::Path;
 use wgpu::{BufferUsages, TextureUsages};
