@@ -67,7 +67,7 @@ impl Gather {
                 size_of::<TileBounds>() as u64,
                 BufferUsages::STORAGE,
             ),
-            masks: geometry::buffer(gpu, "tile lists", 4 * u64::from(BATCH_WORDS), BufferUsages::STORAGE),
+            masks: geometry::buffer(gpu, "tile lists", 8 * u64::from(BATCH_WORDS), BufferUsages::STORAGE),
             tallies: geometry::buffer(gpu, "tile tallies", 8 * u64::from(BATCH_WORDS), TALLIES),
             black: Target::new(gpu, "black", [1, 1], HDR, TextureUsages::TEXTURE_BINDING),
         }
@@ -90,7 +90,8 @@ impl Gather {
         let bytes = count * size_of::<TileBounds>() as u64;
         if self.bounds.size() != bytes {
             self.bounds = geometry::buffer(gpu, "tile bounds", bytes, BufferUsages::STORAGE);
-            self.masks = geometry::buffer(gpu, "tile lists", words * 4, BufferUsages::STORAGE);
+            // Of near lights, too, for interleaved sampling.
+            self.masks = geometry::buffer(gpu, "tile lists", words * 8, BufferUsages::STORAGE);
             self.tallies = geometry::buffer(gpu, "tile tallies", words * 8, TALLIES);
         }
         Ok(())
@@ -223,6 +224,9 @@ impl Gather {
         if writes > 1 {
             targets.spare(scope.gpu);
         }
+        if interleaved {
+            targets.near(scope.gpu);
+        }
         let lists = scope.timer.span("light lists");
         let shading = scope.timer.span("indirect light");
         for batch in 0..batches {
@@ -237,19 +241,35 @@ impl Gather {
             let pipeline = &self.pipelines[&variant];
             let (to, from) = turn(targets, writes - 1 - batch);
             let (offset, bytes) = lights.batch(batch);
-            let resources = [
+            let near = targets.near.as_ref().map(|near| {
+                let at = ((batches - 1 - batch) % 2) as usize;
+                [&near[at].view, &near[1 - at].view]
+            });
+            let black = &self.black.view;
+            let mut resources = vec![
                 whole(scope.frame),
                 texture(&targets.gbuffer.view),
                 part(&lights.lights, offset, bytes),
                 whole(&self.masks),
-                texture(if first { &self.black.view } else { from }),
+                texture(if first { black } else { from }),
             ];
-            let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
-            scope.cover(Edge { span: shading, first, last }, pipeline, &group, to);
+            let edge = Edge { span: shading, first, last };
+            match near.filter(|_| interleaved) {
+                Some([near_to, near_from]) => {
+                    resources.push(texture(if first { black } else { near_from }));
+                    let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
+                    scope.cover_both(edge, pipeline, &group, [to, near_to]);
+                }
+                None => {
+                    let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
+                    scope.cover(edge, pipeline, &group, to);
+                }
+            }
         }
-        if let (true, Some(pipeline)) = (interleaved, &self.join) {
+        if let (true, Some(pipeline), Some(near)) = (interleaved, &self.join, &targets.near) {
             let (to, from) = turn(targets, 0);
-            let resources = [whole(scope.frame), texture(&targets.gbuffer.view), texture(from)];
+            let near = texture(&near[0].view);
+            let resources = [whole(scope.frame), texture(&targets.gbuffer.view), texture(from), near];
             let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
             let edge = scope.alone("interleaving");
             scope.cover(edge, pipeline, &group, to);
@@ -311,12 +331,17 @@ fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
     let additive = Drawing { fragment: Some("add"), format: Some(HDR), additive: true, ..Drawing::default() };
     match variant.accumulation {
         Accumulation::Tiled => {
-            let constants = [
-                ranged,
-                ("CONTINUES", f64::from(variant.continues)),
-                ("INTERLEAVED", f64::from(variant.interleaved)),
-            ];
-            pipelines::covering(gpu, &shader::TILED, "gather", HDR, &constants)
+            let constants = [ranged, ("CONTINUES", f64::from(variant.continues))];
+            let entry = if variant.interleaved { "gather_interleaved" } else { "gather" };
+            let set = Drawing {
+                vertex: "cover",
+                fragment: Some(entry),
+                constants: &constants,
+                second: variant.interleaved,
+                additive: false,
+                ..additive
+            };
+            pipelines::drawing(gpu, &shader::TILED, &set)
         }
         Accumulation::Splat => {
             let constants = [ranged];

@@ -14,6 +14,9 @@ pub(crate) const AREA_FACES: u32 = 5;
 pub(crate) const MAX_COORDINATE: f32 = 1e9;
 /// Largest flux of a published light, in W.
 pub(crate) const MAX_FLUX: f32 = 1e30;
+/// Distance in pixels, times the edge of the pattern of interleaved sampling, within which a light is not interleaved.
+/// Measured: ARCHITECTURE.md.
+pub(crate) const STEEP_PIXELS: f32 = 16.0;
 /// Scrambles the points of an area light that have shadow maps.
 pub(crate) const MAP_SEED: u32 = 0x6D61_7073;
 /// Means: every light.
@@ -69,6 +72,7 @@ pub(crate) fn constants() -> String {
     let mut float = |name: &str, value: f32| text.push_str(&format!("const {name}: f32 = {value:?}f;\n"));
     float("MAX_COORDINATE", MAX_COORDINATE);
     float("MAX_FLUX", MAX_FLUX);
+    float("STEEP_PIXELS", STEEP_PIXELS);
     float("SHADOW_NORMAL_TEXELS", SHADOW_NORMAL_TEXELS);
     float("COMPATIBLE_COS", photonstream_renderer::owner::COMPATIBLE_COS);
     float("EPSILON_OF_ONE", f32::EPSILON);

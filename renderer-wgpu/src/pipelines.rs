@@ -9,6 +9,8 @@ pub(crate) struct Drawing<'a> {
     pub(crate) fragment: Option<&'a str>,
     pub(crate) format: Option<wgpu::TextureFormat>,
     pub(crate) constants: &'a [(&'a str, f64)],
+    /// A second target of the same format.
+    pub(crate) second: bool,
     /// Adds to the target instead of replacing it.
     pub(crate) additive: bool,
     pub(crate) depth: Option<wgpu::DepthStencilState>,
@@ -31,7 +33,7 @@ pub(crate) fn drawing(gpu: &Gpu, source: &Source, drawing: &Drawing<'_>) -> wgpu
         blend: drawing.additive.then_some(wgpu::BlendState { color: add, alpha: add }),
         write_mask: wgpu::ColorWrites::ALL,
     });
-    let targets = [target];
+    let targets = vec![target; if drawing.second { 2 } else { 1 }];
     let corners: Vec<_> = drawing.corners.iter().cloned().map(Some).collect();
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(source.name),

@@ -43,6 +43,36 @@ impl Scope<'_> {
         pass.draw(0..3, 0..1);
     }
 
+    /// The same with a second target.
+    pub(crate) fn cover_both(
+        &mut self,
+        edge: Edge,
+        pipeline: &wgpu::RenderPipeline,
+        group: &wgpu::BindGroup,
+        targets: [&wgpu::TextureView; 2],
+    ) {
+        let colours = targets.map(|view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })
+        });
+        let mut pass = self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: None,
+            color_attachments: &colours,
+            timestamp_writes: self.timer.render_writes(edge.span, edge.first, edge.last),
+            ..Default::default()
+        });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+
     /// A pass that draws to `target`, tested against `depth` where given.
     pub(crate) fn render_pass(
         &mut self,

@@ -124,7 +124,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Stage::*, *};
     use photonstream_scene::RenderSettings;
 
     fn view() -> View {
@@ -135,15 +135,7 @@ mod tests {
     #[test]
     fn a_stage_is_done_again_only_for_what_it_depends_on() {
         let (view, versions) = (view(), Versions::default());
-        let stages = [
-            Stage::GBuffer,
-            Stage::Direct,
-            Stage::Unpack,
-            Stage::Indirect,
-            Stage::Openness,
-            Stage::Owners,
-            Stage::Output,
-        ];
+        let stages = [GBuffer, Direct, Unpack, Indirect, Openness, Owners, Output];
         let mut done = Done::default();
         for stage in stages {
             assert!(done.is_stale(stage, &view, versions));
@@ -152,7 +144,7 @@ mod tests {
         let stale = |view: View, versions| {
             stages.into_iter().filter(|&s| done.is_stale(s, &view, versions)).collect::<Vec<_>>()
         };
-        use Stage::*;
+
         assert_eq!(stale(view, versions), []);
         let mut camera = view.camera;
         camera.position.x = 1.0;

@@ -53,6 +53,8 @@ pub(crate) struct Targets {
     pub(crate) output: Target,
     /// The other one of two that passes read and write in turn.
     pub(crate) spare: Option<Target>,
+    /// Irradiance of the lights that interleaved sampling leaves out, two that are read and written in turn.
+    pub(crate) near: Option<[Target; 2]>,
     pub(crate) openness: Option<[Target; 2]>,
     pub(crate) owners: Option<[Target; 2]>,
 }
@@ -72,6 +74,7 @@ impl Targets {
             indirect: Target::new(gpu, "indirect irradiance", size, HDR, traced),
             output: Target::new(gpu, "shown layer", size, HDR, DRAWN | TextureUsages::COPY_SRC),
             spare: None,
+            near: None,
             openness: None,
             owners: None,
         };
@@ -88,6 +91,13 @@ impl Targets {
         let size = self.size;
         self.spare.get_or_insert_with(|| {
             Target::new(gpu, "indirect irradiance, spare", size, HDR, DRAWN | TextureUsages::STORAGE_BINDING)
+        })
+    }
+
+    pub(crate) fn near(&mut self, gpu: &Gpu) -> &[Target; 2] {
+        let size = self.size;
+        self.near.get_or_insert_with(|| {
+            ["near lights", "near lights, spare"].map(|label| Target::new(gpu, label, size, HDR, DRAWN))
         })
     }
 

@@ -50,6 +50,7 @@ struct Batch {
 
 @group(1) @binding(0) var<storage, read> tiles: array<TileBounds>;
 @group(1) @binding(1) var<uniform> batch: Batch;
+// Lists of all lights; with interleaved sampling of the far ones, and behind them those of the near ones.
 @group(1) @binding(2) var<storage, read_write> masks: array<u32>;
 // For each word of each tile: upper bound of the radiance that skipped lights would have added, summed over the
 // tile's receivers (W m⁻² sr⁻¹), and number of lights kept; summed over the batches.
@@ -63,7 +64,11 @@ fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     }
     let tile = tiles[index / BATCH_WORDS];
     let word = index % BATCH_WORDS;
+    // Lights so near that what they add changes from pixel to pixel: not to be interleaved.
+    let away = max(abs(tile.lo - frame.camera.position), abs(tile.hi - frame.camera.position));
+    let steep = steep_range(length(away));
     var mask = 0u;
+    var near_mask = 0u;
     var skipped = 0.0;
     if tile.receivers > 0u {
         for (var bit = 0u; bit < 32u; bit++) {
@@ -92,9 +97,16 @@ fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
             if dot(far, far) > light.range_sq {
                 skipped += bound / light.range_sq * f32(tile.receivers);
             }
-            mask |= 1u << bit;
+            if frame.interleave > 1u && nearest_sq < steep * steep {
+                near_mask |= 1u << bit;
+            } else {
+                mask |= 1u << bit;
+            }
         }
     }
     masks[index] = mask;
-    tallies[index] += vec2f(skipped, f32(countOneBits(mask)));
+    if frame.interleave > 1u {
+        masks[frame.tiles.x * frame.tiles.y * BATCH_WORDS + index] = near_mask;
+    }
+    tallies[index] += vec2f(skipped, f32(countOneBits(mask | near_mask)));
 }

@@ -73,6 +73,13 @@ fn object_reflects(object: Object, front: bool) -> bool {
     return (object.sides & select(2u, 1u, front)) != 0u;
 }
 
+// Within this distance in m of a surface at `distance` from the eye, what a light adds changes much over the pixels of
+// the pattern of interleaved sampling.
+fn steep_range(distance: f32) -> f32 {
+    let pixel = distance * 2.0 * frame.camera.tan_half_fov / f32(frame.size.y);
+    return pixel * f32(frame.interleave) * STEEP_PIXELS;
+}
+
 // A triangle that covers the picture, from its vertex number.
 fn covering_triangle(vertex: u32) -> vec4f {
     let at = vec2f(f32((vertex << 1u) & 2u), f32(vertex & 2u));

@@ -1,7 +1,9 @@
 // Turns interleaved irradiance into that of all lights: a mean over the pattern around each pixel, edges respected.
 
 @group(0) @binding(1) var gbuffer: texture_2d<u32>;
+// Of the far lights, each pixel its part; of the near lights, all.
 @group(0) @binding(2) var part: texture_2d<f32>;
+@group(0) @binding(3) var near_lights: texture_2d<f32>;
 
 @vertex
 fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
@@ -19,24 +21,28 @@ fn join(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let edge = i32(frame.interleave);
     var sum = vec3f(0.0);
     var found = 0.0;
-    // Each place of the pattern has four pixels around this one, two in each direction: the nearest of them that sees
-    // the same surface speaks for the place.
+    // Each place of the pattern has four pixels around this one, two in each direction: what they say is interpolated,
+    // as far as they see the same surface.
     for (var i = 0; i < edge * edge; i++) {
         let ahead = vec2i(i % edge, i / edge);
-        let behind = ahead - edge;
-        let near = select(behind, ahead, ahead <= vec2i(edge / 2));
-        let far = select(ahead, behind, ahead <= vec2i(edge / 2));
-        var offsets = array<vec2i, 4>(near, vec2i(far.x, near.y), vec2i(near.x, far.y), far);
+        let share = vec2f(ahead) / f32(edge);
+        var here = vec3f(0.0);
+        var weight = 0.0;
         for (var k = 0; k < 4; k++) {
-            let q = vec2i(pixel) + offsets[k];
-            if sees_same_surface(q, surface) {
-                sum += textureLoad(part, vec2u(q), 0).rgb;
-                found += 1.0;
-                break;
+            let turn = vec2i(k & 1, k >> 1u);
+            let parts = select(vec2f(1.0) - share, share, turn == vec2i(1));
+            let q = vec2i(pixel) + ahead - turn * edge;
+            if parts.x * parts.y > 0.0 && sees_same_surface(q, surface) {
+                here += textureLoad(part, vec2u(q), 0).rgb * (parts.x * parts.y);
+                weight += parts.x * parts.y;
             }
         }
+        if weight > 0.0 {
+            sum += here / weight;
+            found += 1.0;
+        }
     }
-    return vec4f(sum * (f32(edge * edge) / found), 0.0);
+    return vec4f(sum * (f32(edge * edge) / found) + textureLoad(near_lights, pixel, 0).rgb, 0.0);
 }
 
 fn sees_same_surface(q: vec2i, surface: Surface) -> bool {

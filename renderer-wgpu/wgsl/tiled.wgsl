@@ -8,11 +8,10 @@ struct Batch {
 @group(0) @binding(2) var<uniform> batch: Batch;
 @group(0) @binding(3) var<storage, read> masks: array<u32>;
 @group(0) @binding(4) var before: texture_2d<f32>;
+@group(0) @binding(5) var before_near: texture_2d<f32>;
 
 // Whether there is irradiance of earlier batches to add to.
 override CONTINUES: bool = false;
-// Whether a pixel sees only the lights of its place in the pattern of interleaved sampling.
-override INTERLEAVED: bool = false;
 
 @vertex
 fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
@@ -29,22 +28,68 @@ fn gather(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let word = textureLoad(gbuffer, pixel, 0);
     if surface_is_there(word) {
         let surface = surface_unpack(word, pixel);
-        let tile = pixel / TILE_EDGE;
-        let first = (tile.y * frame.tiles.x + tile.x) * BATCH_WORDS;
-        var kept = 0xffffffffu;
-        if INTERLEAVED {
-            kept = interleaved_lights(pixel);
-        }
+        irradiance += sum_of_list(surface, first_word(pixel), 0xffffffffu);
+    }
+    return vec4f(irradiance, 0.0);
+}
+
+struct Parts {
+    @location(0) far: vec4f,
+    @location(1) near: vec4f,
+}
+
+// Of the far lights those of the pixel's place in the pattern, of the near ones all; a light passes smoothly from one to
+// the other, so that what neighbours add fits together whatever list of whatever tile it comes from.
+@fragment
+fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
+    let pixel = vec2u(at.xy);
+    var far = vec3f(0.0);
+    var near = vec3f(0.0);
+    if CONTINUES {
+        far = textureLoad(before, pixel, 0).rgb;
+        near = textureLoad(before_near, pixel, 0).rgb;
+    }
+    let word = textureLoad(gbuffer, pixel, 0);
+    if surface_is_there(word) {
+        let surface = surface_unpack(word, pixel);
+        let place = interleaved_lights(pixel);
+        let first = first_word(pixel);
+        far += sum_of_list(surface, first, place);
+        let steep = steep_range(surface.distance);
+        let first_near = frame.tiles.x * frame.tiles.y * BATCH_WORDS + first;
         for (var i = 0u; i < BATCH_WORDS; i++) {
-            var bits = masks[first + i] & kept;
+            var bits = masks[first_near + i];
             while bits != 0u {
-                let light = batch.lights[i * 32u + firstTrailingBit(bits)];
+                let bit = firstTrailingBit(bits);
                 bits &= bits - 1u;
-                irradiance += vsl_irradiance(light, surface.position, surface.normal);
+                let light = batch.lights[i * 32u + bit];
+                let added = vsl_irradiance(light, surface.position, surface.normal);
+                let share_far = smoothstep(0.5 * steep, steep, distance(light.position, surface.position));
+                near += added * (1.0 - share_far);
+                far += added * select(0.0, share_far, ((place >> bit) & 1u) == 1u);
             }
         }
     }
-    return vec4f(irradiance, 0.0);
+    return Parts(vec4f(far, 0.0), vec4f(near, 0.0));
+}
+
+fn first_word(pixel: vec2u) -> u32 {
+    let tile = pixel / TILE_EDGE;
+    return (tile.y * frame.tiles.x + tile.x) * BATCH_WORDS;
+}
+
+// Irradiance of the lights of a list that are `kept`, a mask of every 32.
+fn sum_of_list(surface: Surface, first: u32, kept: u32) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < BATCH_WORDS; i++) {
+        var bits = masks[first + i] & kept;
+        while bits != 0u {
+            let light = batch.lights[i * 32u + firstTrailingBit(bits)];
+            bits &= bits - 1u;
+            sum += vsl_irradiance(light, surface.position, surface.normal);
+        }
+    }
+    return sum;
 }
 
 // The lights of every 32 that a pixel sees: those whose index is the pixel's number modulo the pattern's size.
