@@ -7,7 +7,7 @@ use photonstream_film::Film;
 fn the_bare_command_makes_pictures_and_ends() {
     let ground = Ground::new();
     let said = ground.run(&[]);
-    said.expect(0, &["no window renderer in this build", "first picture after"]);
+    said.expect(0, &["without a window: no display", "first picture after"]);
     let lines: Vec<_> = said.stdout.lines().collect();
     assert_eq!(&lines[..2], ["out/cornell-box.exr", "out/cornell-box.png"], "{said:?}");
     assert!(lines.len() == 3, "one line of figures: {said:?}");

@@ -78,6 +78,10 @@ impl Ground {
             .current_dir(self.path(""))
             .env("PHOTONSTREAM_RUNTIME_DIR", self.runtime())
             .env_remove("RUST_LOG")
+            // No test opens a window on the display of whoever runs it.
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
             .env_remove("PHOTONSTREAM_OWNED")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

@@ -5,6 +5,7 @@ mod default_run;
 mod edits;
 mod ending;
 mod giving_up;
+mod gpu;
 mod harness;
 mod kills;
 mod main_job;
