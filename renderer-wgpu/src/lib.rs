@@ -4,6 +4,7 @@
 pub mod cli;
 mod deferred;
 mod error;
+mod frame;
 mod gather;
 mod geometry;
 mod gpu;
