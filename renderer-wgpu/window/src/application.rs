@@ -6,10 +6,10 @@ use crate::{
     following::Following,
     graphics::{Graphics, Shown},
     overlay::{self, Machine},
-    pointer::Button,
     screenshot,
     session::{Effort, Session},
 };
+use photonstream_film::Display;
 use photonstream_protocol::monotonic_ns;
 use photonstream_renderer_wgpu::{Drawn, GpuError};
 use std::{
@@ -19,10 +19,9 @@ use std::{
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
-    event::{ElementState, MouseButton, MouseScrollDelta, StartCause, WindowEvent},
+    event::{StartCause, WindowEvent},
     event_loop::{ActiveEventLoop, ControlFlow, EventLoop},
-    keyboard::{KeyCode, PhysicalKey},
-    window::{Fullscreen, Window, WindowId},
+    window::{Window, WindowId},
 };
 
 /// A device that fails so often within [`FAILING`] is given up.
@@ -58,14 +57,27 @@ pub enum Ended {
 #[derive(Clone, Copy, Debug)]
 struct Wake;
 
+/// Whether there is a display to open a window on. Must be called from the main thread, and not by a process that calls
+/// [`run`]: a process may connect to its display once.
+///
+/// # Errors
+/// [`WindowError::NoDisplay`].
+pub fn find_display() -> Result<(), WindowError> {
+    event_loop().map(drop)
+}
+
+fn event_loop() -> Result<EventLoop<Wake>, WindowError> {
+    let built = EventLoop::<Wake>::with_user_event().build();
+    built.map_err(|error| WindowError::NoDisplay { reason: error.to_string() })
+}
+
 /// Opens a window on the channel that `args` name, also before there is one, until the user closes it, all frames asked
 /// for are shown, or `cancelled` is set. Must be called from the main thread, once in a process.
 ///
 /// # Errors
 /// [`WindowError`]: no display, no adapter, a channel that is insecure or of another release.
 pub fn run(args: &Args, cancelled: &Arc<AtomicBool>) -> Result<Report, WindowError> {
-    let mut builder = EventLoop::<Wake>::with_user_event();
-    let event_loop = builder.build().map_err(|error| WindowError::NoDisplay { reason: error.to_string() })?;
+    let event_loop = event_loop()?;
     event_loop.set_control_flow(ControlFlow::Wait);
     let wake = || {
         let proxy = event_loop.create_proxy();
@@ -104,15 +116,16 @@ pub fn run(args: &Args, cancelled: &Arc<AtomicBool>) -> Result<Report, WindowErr
     application.error.map_or(Ok(application.report), Err)
 }
 
-struct Application {
-    session: Session,
+/// The window and all that belongs to it.
+pub(crate) struct Application {
+    pub(crate) session: Session,
     following: Following,
     commands: Commands,
     told: mpsc::Receiver<Told>,
-    window: Option<Arc<Window>>,
-    graphics: Option<Graphics>,
+    pub(crate) window: Option<Arc<Window>>,
+    pub(crate) graphics: Option<Graphics>,
     machine: Machine,
-    is_occluded: bool,
+    pub(crate) is_occluded: bool,
     /// When the last picture was drawn, while the camera moves.
     last: Option<Instant>,
     /// When the interface wants to be laid out again.
@@ -173,7 +186,7 @@ impl ApplicationHandler<Wake> for Application {
 }
 
 impl Application {
-    fn end(&mut self, event_loop: &ActiveEventLoop, ended: Ended) {
+    pub(crate) fn end(&mut self, event_loop: &ActiveEventLoop, ended: Ended) {
         self.report.ended = ended;
         event_loop.exit();
     }
@@ -185,7 +198,7 @@ impl Application {
         }
     }
 
-    fn request_redraw(&self) {
+    pub(crate) fn request_redraw(&self) {
         if let Some(window) = &self.window
             && !self.is_occluded
         {
@@ -221,88 +234,13 @@ impl Application {
         window: Arc<Window>,
         memory: Option<egui::Memory>,
     ) -> Result<(), WindowError> {
-        let choice = self.session.args.adapter_choice();
+        let choice = self.session.args.gpu.adapter();
         let graphics = Graphics::open(event_loop.owned_display_handle(), window, &choice, memory)?;
         let gpu = graphics.renderer.gpu();
         self.machine = Machine { adapter: gpu.name(), is_software: gpu.is_software() };
         tracing::info!("showing pictures of {}", self.machine.adapter);
         self.graphics = Some(graphics);
         Ok(())
-    }
-
-    fn input(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
-        let (Some(window), Some(graphics)) = (&self.window, &mut self.graphics) else { return };
-        let session = &mut self.session;
-        // Tab is the overlay's own key, not a step to the next button.
-        let is_tab = matches!(event, WindowEvent::KeyboardInput { event, .. }
-            if event.physical_key == PhysicalKey::Code(KeyCode::Tab));
-        let (mut repaint, consumed) = if is_tab && !graphics.interface.takes_keys() {
-            (false, false)
-        } else {
-            graphics.interface.hear(window, event)
-        };
-        match event {
-            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => repaint = true,
-            WindowEvent::Occluded(is_occluded) => {
-                self.is_occluded = *is_occluded;
-                repaint = true;
-            }
-            WindowEvent::Focused(false) => session.motion.stop(),
-            WindowEvent::ModifiersChanged(modifiers) => {
-                let state = modifiers.state();
-                session.motion.set_fast(state.shift_key());
-                session.pointer.control = state.control_key();
-                if session.pointer.shift != state.shift_key() {
-                    session.pointer.shift = state.shift_key();
-                    session.drag();
-                }
-            }
-            WindowEvent::KeyboardInput { event, .. } => {
-                let is_down = event.state == ElementState::Pressed;
-                // A key that went down for the camera has to come up for it too.
-                if let PhysicalKey::Code(key) = event.physical_key
-                    && (!consumed || !is_down)
-                {
-                    let was_fullscreen = session.wants_fullscreen;
-                    session.key(key, is_down, event.repeat);
-                    if session.wants_fullscreen != was_fullscreen {
-                        let fullscreen = session.wants_fullscreen.then_some(Fullscreen::Borderless(None));
-                        window.set_fullscreen(fullscreen);
-                    }
-                    repaint = true;
-                }
-            }
-            WindowEvent::CursorMoved { position, .. } => {
-                repaint |= session.point([position.x as f32, position.y as f32]);
-            }
-            WindowEvent::MouseInput { state, button, .. } => {
-                let button = match button {
-                    MouseButton::Left => Button::Left,
-                    MouseButton::Right => Button::Right,
-                    MouseButton::Middle => Button::Middle,
-                    _ => return,
-                };
-                match state {
-                    ElementState::Pressed if consumed => {}
-                    ElementState::Pressed => session.press(button),
-                    ElementState::Released => session.release(button),
-                }
-                repaint = true;
-            }
-            WindowEvent::MouseWheel { delta, .. } if !consumed => {
-                session.wheel(match delta {
-                    MouseScrollDelta::LineDelta(_, lines) => *lines,
-                    MouseScrollDelta::PixelDelta(pixels) => pixels.y as f32 / 40.0,
-                });
-                repaint = true;
-            }
-            _ => {}
-        }
-        if session.wants_end {
-            self.end(event_loop, Ended::Closed);
-        } else if repaint {
-            self.request_redraw();
-        }
     }
 
     /// Takes in the news, and shows what there is to see.
@@ -322,10 +260,18 @@ impl Application {
         let is_moving = session.advance(elapsed);
         self.last = is_moving.then_some(now);
 
-        let gpu = graphics.renderer.gpu().clone();
         let machine = &self.machine;
-        let delay = graphics.interface.lay_out(&window, &gpu, |ui| overlay::show(ui, session, machine, now));
-        let result = picture(graphics, session, now);
+        let mut delay = Duration::MAX;
+        let result = picture(graphics, session, now).and_then(|display| {
+            let gpu = graphics.renderer.gpu().clone();
+            let drawn = session.view();
+            delay = graphics.interface.lay_out(&window, &gpu, |ui| overlay::show(ui, session, machine, now));
+            // What was just switched is drawn next.
+            if session.view() != drawn || session.wants_screenshot {
+                delay = Duration::ZERO;
+            }
+            graphics.present(display)
+        });
         match result {
             Ok(Shown::Yes) => {
                 self.report.presented += 1;
@@ -333,7 +279,7 @@ impl Application {
                 if self.session.count_shown(monotonic_ns()) {
                     self.end(event_loop, Ended::Done);
                 }
-                self.inject_fault();
+                self.inject_fault(event_loop, &window)?;
             }
             Ok(Shown::Hidden) => {}
             Ok(Shown::Again) => window.request_redraw(),
@@ -370,21 +316,30 @@ impl Application {
     }
 
     /// Destroys the device once, where the arguments ask for it.
-    fn inject_fault(&mut self) {
+    fn inject_fault(
+        &mut self,
+        event_loop: &ActiveEventLoop,
+        window: &Arc<Window>,
+    ) -> Result<(), WindowError> {
         let is_due = self.session.args.lose_device_after.is_some_and(|n| self.report.presented >= n);
-        if let Some(graphics) = self.graphics.as_ref().filter(|_| is_due) {
-            self.session.args.lose_device_after = None;
-            graphics.renderer.gpu().device.destroy();
-            self.request_redraw();
-        }
+        let Some(graphics) = self.graphics.as_ref().filter(|_| is_due) else { return Ok(()) };
+        self.session.args.lose_device_after = None;
+        graphics.renderer.gpu().device.destroy();
+        // Its owner has destroyed it: the driver does not report that as a loss.
+        let reason = "fault injection".into();
+        self.reopen(event_loop, Arc::clone(window), GpuError::Lost { reason })
     }
 }
 
-/// Draws what changed and shows it; an option that this device lacks is told and put back.
-fn picture(graphics: &mut Graphics, session: &mut Session, now: Instant) -> Result<Shown, GpuError> {
-    let view = session.view();
-    let Some((view, published)) = view.zip(session.published.clone()) else { return graphics.present(None) };
-    graphics.renderer.set_timed(session.shows_overlay);
+/// Draws what changed; how it is to be displayed, if there is a picture. An option that this device lacks is told and
+/// put back.
+fn picture(
+    graphics: &mut Graphics,
+    session: &mut Session,
+    now: Instant,
+) -> Result<Option<Display>, GpuError> {
+    let Some((view, published)) = session.view().zip(session.published.clone()) else { return Ok(None) };
+    graphics.renderer.set_timed(session.shows_overlay || session.args.gpu.stats);
     graphics.renderer.set_scene(&published.scene)?;
     graphics.renderer.set_frame(&published.frame)?;
     match graphics.renderer.draw(&view) {
@@ -409,6 +364,5 @@ fn picture(graphics: &mut Graphics, session: &mut Session, now: Instant) -> Resu
         // The file may have been drawn otherwise than the window shows it.
         graphics.renderer.draw(&view)?;
     }
-    let display = session.choices.as_ref().map(|choices| choices.display());
-    graphics.present(display)
+    Ok(session.choices.as_ref().map(|choices| choices.display()))
 }

@@ -2,7 +2,7 @@
 
 use photonstream_protocol::ChannelName;
 use photonstream_renderer::{LayerKind, cli::Size};
-use photonstream_renderer_wgpu::{Accumulation, AdapterChoice, Shadows};
+use photonstream_renderer_wgpu::cli::GpuArgs;
 use photonstream_scene::Visibility;
 use photonstream_shading::Kernel;
 use std::path::PathBuf;
@@ -19,12 +19,6 @@ pub struct Args {
     /// Size of the window's picture in pixels, such as 800x600; the scene's own if not given.
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Graphics adapter: a part of its name; the most capable one if not given.
-    #[arg(long, value_name = "NAME")]
-    pub adapter: Option<String>,
-    /// Draw in software, on the CPU.
-    #[arg(long)]
-    pub software: bool,
     /// End after having shown so many published frames.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
@@ -34,31 +28,22 @@ pub struct Args {
     /// Shadows of indirect light at first: none, ao or rays; the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
-    /// How virtual surface lights are summed at first: forward, splat or tiled.
-    #[arg(long, value_name = "A")]
-    pub accumulation: Option<Accumulation>,
-    /// How lights are shadowed at first: maps, rays or none.
-    #[arg(long, value_name = "S")]
-    pub shadows: Option<Shadows>,
     /// What is shown at first: full, direct, indirect, albedo, normal, vsl, flux, depth.
     #[arg(long, value_name = "LAYER", default_value = "full")]
     pub show: LayerKind,
+    /// What only the GPU renderer has; accumulation, interleave, shadows and rays at first.
+    #[command(flatten)]
+    pub gpu: GpuArgs,
     /// Fault injection: the graphics device is destroyed once, after so many pictures.
     #[arg(long, value_name = "N", hide = true)]
     pub lose_device_after: Option<u64>,
-}
-
-impl Args {
-    /// Which adapter to take.
-    pub fn adapter_choice(&self) -> AdapterChoice {
-        AdapterChoice { name: self.adapter.clone(), software: self.software }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::Parser;
+    use photonstream_renderer_wgpu::{Accumulation, AdapterChoice, Shadows};
 
     #[derive(Parser)]
     struct Command {
@@ -73,9 +58,12 @@ mod tests {
         let line = "w --channel a --out x --size 320x200 --adapter llvm --software --frames 3 --kernel paper \
                     --visibility ao --accumulation splat --shadows rays --show indirect";
         let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
-        assert_eq!(args.adapter_choice(), AdapterChoice { name: Some("llvm".into()), software: true });
+        assert_eq!(args.gpu.adapter(), AdapterChoice { name: Some("llvm".into()), software: true });
         assert_eq!(args.size, Some(Size { width: 320, height: 200 }));
-        assert_eq!((args.accumulation, args.shadows), (Some(Accumulation::Splat), Some(Shadows::Rays)));
+        assert_eq!(
+            (args.gpu.accumulation, args.gpu.shadows),
+            (Some(Accumulation::Splat), Some(Shadows::Rays))
+        );
         for (line, expected) in [
             ("w --accumulation til", "forward, splat, tiled"),
             ("w --shadows soft", "maps, rays, none"),

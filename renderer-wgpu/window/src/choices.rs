@@ -24,8 +24,9 @@ impl Choices {
         let mut view = View::from_settings(settings, camera);
         view.kernel = args.kernel.unwrap_or(view.kernel);
         view.visibility = args.visibility.unwrap_or(view.visibility);
-        view.accumulation = args.accumulation.unwrap_or(view.accumulation);
-        view.shadows = args.shadows.unwrap_or(view.shadows);
+        let gpu = args.gpu.choices();
+        (view.accumulation, view.interleave) = (gpu.accumulation, gpu.interleave);
+        (view.shadows, view.rays_per_pixel) = (gpu.shadows, gpu.rays_per_pixel);
         view.show = Show::Layer(args.show);
         Self { view, exposure_ev: settings.exposure_ev, tone_map: settings.tone_map }
     }

@@ -49,9 +49,9 @@ pub(crate) struct News {
     /// What is wrong with the channel or its scene now, if anything.
     pub(crate) problem: Option<String>,
     /// Why nothing will ever come.
-    fatal: Option<ProtocolError>,
+    pub(crate) fatal: Option<ProtocolError>,
     /// Somebody asked the program to end.
-    is_cancelled: bool,
+    pub(crate) is_cancelled: bool,
 }
 
 #[derive(Debug, Default)]

@@ -101,7 +101,7 @@ impl Graphics {
             }
             wgpu::CurrentSurfaceTexture::Validation => {
                 self.renderer.gpu().check()?;
-                return Ok(Shown::Hidden);
+                return Err(GpuError::Device { reason: "the window's surface gave no texture".into() });
             }
         };
         let view = target.texture.create_view(&wgpu::TextureViewDescriptor::default());

@@ -13,6 +13,7 @@ mod dragging;
 mod error;
 mod following;
 mod graphics;
+mod input;
 mod interface;
 mod keys;
 mod latency;
@@ -25,6 +26,6 @@ mod screenshot;
 mod session;
 mod standing;
 
-pub use application::{Ended, Report, run};
+pub use application::{Ended, Report, find_display, run};
 pub use arguments::Args;
 pub use error::WindowError;

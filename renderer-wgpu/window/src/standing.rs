@@ -60,6 +60,7 @@ mod tests {
             [camera]
             position_m = [3000.0, 1.0, 4.0]
             target_m = [3000.0, 1.0, 0.0]
+            vertical_fov_deg = 40
             [material.white]
             albedo = 0.5
             [object.floor]

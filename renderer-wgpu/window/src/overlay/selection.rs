@@ -1,6 +1,6 @@
 //! Turns the selected light or object into sliders, and their motion into requests.
 
-use super::{right, window};
+use super::window;
 use crate::{
     commands::{place_light, place_object, power_light, switch_light},
     following::Published,
@@ -42,7 +42,7 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
         Selected::Light(name) => format!("Light {name}"),
         Selected::Object(name) => format!("Object {name}"),
     };
-    let place = pos2(right(ctx) - 250.0, 330.0);
+    let place = pos2(8.0, 390.0);
     let mut requests = Vec::new();
     window("selection", place).title_bar(false).default_width(234.0).show(ctx, |ui| {
         ui.strong(title);

@@ -44,8 +44,8 @@ fn lines(session: &Session) -> Vec<(&'static str, String)> {
         ]);
     }
     if session.latency.is_known() {
-        lines.push(("change → published", format!("{:.1} ms", session.latency.published_ms)));
-        lines.push(("published → shown", format!("{:.1} ms", session.latency.shown_ms)));
+        lines.push(("change to published", format!("{:.1} ms", session.latency.published_ms)));
+        lines.push(("published to shown", format!("{:.1} ms", session.latency.shown_ms)));
     }
     lines
 }

@@ -1,0 +1,182 @@
+//! Turns a real window on a virtual display, driven by synthetic keys and mouse, into checks of what it shows.
+#![allow(clippy::unwrap_used)]
+
+mod display;
+mod simulator;
+mod window;
+
+use display::Display;
+use glam::Vec3;
+use photonstream_film::Film;
+use photonstream_protocol::VslFrame;
+use photonstream_renderer::{LayerKind, published::PublishedScene};
+use photonstream_renderer_wgpu::{Renderer, View, test_gpu};
+use photonstream_scene::Visibility;
+use photonstream_shading::Camera;
+use simulator::Simulator;
+use window::{Shot, Window};
+
+/// Size of the windows: small, since software draws them.
+const SIZE: (u32, u32) = (320, 240);
+
+/// The display and the device that these tests need, or a loud word that they are not there.
+fn ready() -> Option<(Display, Renderer)> {
+    let gpu = test_gpu::gpu()?;
+    let display = Display::open()?;
+    Some((display, Renderer::new(gpu).unwrap()))
+}
+
+/// The picture that a renderer without a window makes of `frame`.
+fn headless(
+    renderer: &mut Renderer,
+    frame: &VslFrame,
+    camera: Camera,
+    size: (u32, u32),
+    kind: LayerKind,
+) -> Film {
+    let mut published = PublishedScene::default();
+    let scene = published.update(frame).unwrap();
+    renderer.set_scene(scene).unwrap();
+    renderer.set_frame(frame).unwrap();
+    let view = View {
+        width: size.0,
+        height: size.1,
+        visibility: Visibility::None,
+        ..View::from_settings(&scene.render, &camera)
+    };
+    renderer.film(&view, &[kind]).unwrap()
+}
+
+/// The same device and shaders, the same numbers: equal up to what the driver does with two pictures' worth of threads,
+/// which has been bit-equal; 1e-5 would be a visible change of no pixel.
+fn assert_same(found: &Film, expected: &Film, kind: LayerKind) {
+    assert_eq!((found.width(), found.height()), (expected.width(), expected.height()));
+    let (found, expected) =
+        (&found.layer(kind.name()).unwrap().pixels, &expected.layer(kind.name()).unwrap().pixels);
+    let square =
+        |pixels: &mut dyn Iterator<Item = Vec3>| pixels.map(|p| f64::from(p.length_squared())).sum::<f64>();
+    let difference = square(&mut found.iter().zip(expected).map(|(a, b)| *a - *b));
+    let size = square(&mut expected.iter().copied());
+    assert!(size > 0.0, "{kind}: the picture is black");
+    assert!(difference <= 1e-10 * size, "{kind}: rel. RMSE {:e}", (difference / size).sqrt());
+}
+
+/// A screenshot, compared with what a renderer without a window makes of the same frame and camera.
+fn compare(
+    window: &mut Window<'_>,
+    simulator: &mut Simulator,
+    renderer: &mut Renderer,
+    kind: LayerKind,
+) -> Shot {
+    let shot = window.screenshot();
+    let frame = simulator.newest();
+    assert_eq!(shot.film.metadata.frame, Some(frame.frame), "the light is at rest");
+    let size = (shot.film.width(), shot.film.height());
+    assert_same(&shot.film, &headless(renderer, frame, shot.camera, size, kind), kind);
+    shot
+}
+
+#[test]
+fn a_window_shows_what_is_published_and_follows_the_hands_of_its_user() {
+    let Some((display, mut renderer)) = ready() else { return };
+    let mut simulator = Simulator::start("driven");
+    let mut window = Window::open(&display, simulator.channel(), SIZE, &["--visibility", "none"]);
+    window.rest(&mut simulator);
+
+    // Nothing changes: nothing is drawn.
+    let before = window.presented();
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert_eq!(window.presented(), before, "a still scene with a still camera is not drawn again");
+
+    let home = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    let scene = simulator.scene();
+    assert_eq!(home.camera, scene.camera, "the scene's own camera, bit for bit");
+
+    // Keys move the camera; without the overlay, which covers most of so small a window.
+    window.key("Tab");
+    window.hold_key("w", 300);
+    window.rest(&mut simulator);
+    let nearer = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    assert!(nearer.camera.position.z < home.camera.position.z - 0.01, "{:?}", nearer.camera);
+
+    // So does the mouse beside things.
+    window.drag((20, 120), (80, 100), 3);
+    window.rest(&mut simulator);
+    let turned = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    assert!(turned.camera.forward.distance(home.camera.forward) > 0.05, "{:?}", turned.camera);
+
+    // Views are switched by keys.
+    for (key, kind) in [("2", LayerKind::Direct), ("3", LayerKind::Indirect), ("6", LayerKind::Vsl)] {
+        window.key(key);
+        window.rest(&mut simulator);
+        compare(&mut window, &mut simulator, &mut renderer, kind);
+    }
+    for key in ["9", "0", "t", "F1", "h", "Tab", "h"] {
+        let before = window.presented();
+        window.key(key);
+        window.wait("a picture", |w| w.presented() > before);
+    }
+    window.key("1");
+    window.key("r");
+    window.rest(&mut simulator);
+
+    // The sphere follows the mouse, and the light follows the sphere.
+    let sphere = simulator.place_of("sphere");
+    let from = window::on_screen(&home.camera, sphere.as_vec3(), SIZE);
+    window.drag(from, (from.0 - 40, from.1), 1);
+    window.wait("the sphere elsewhere", |_| simulator.place_of("sphere").x < sphere.x - 0.1);
+    window.rest(&mut simulator);
+    let moved = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    assert_eq!(moved.camera, home.camera, "R brought the camera home");
+    let place = simulator.place_of("sphere");
+    // Parallel to the screen: y and z stay but for the rounding of f32.
+    assert!((place.y - sphere.y).abs() < 1e-4 && (place.z - sphere.z).abs() < 1e-4, "{place} {sphere}");
+
+    // The picture has the size of the window.
+    window.resize(202, 151);
+    window.rest(&mut simulator);
+    let resized = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    assert_eq!((resized.film.width(), resized.film.height()), (202, 151));
+
+    // The simulator ends, and another takes its place.
+    let before = window.presented();
+    simulator.restart();
+    window.wait("pictures of the next run", |w| w.presented() > before + 1);
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+
+    window.key("ctrl+q");
+    window.expect_end();
+}
+
+#[test]
+fn a_lost_device_is_opened_again_and_the_frames_asked_for_are_counted() {
+    let Some((display, mut renderer)) = ready() else { return };
+    let mut simulator = Simulator::start("lost-device");
+    let mut window = Window::open(
+        &display,
+        simulator.channel(),
+        SIZE,
+        &["--visibility", "none", "--lose-device-after", "1"],
+    );
+    window.wait("the device's loss", |w| w.said("it was opened again"));
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    window.terminate();
+    window.expect_end();
+    let mut window = Window::open(&display, simulator.channel(), SIZE, &["--frames", "1"]);
+    window.expect_end();
+}
+
+#[test]
+fn without_a_display_the_way_out_is_told() {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_photonstream-window"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("no display") && said.contains("--headless"), "{said}");
+}
