@@ -9,7 +9,14 @@
 //! On a discrete device the copy reads the pages over its bus, once a frame.
 //!
 //! # Measured
-//! See `cargo test --release -p photonstream-renderer-wgpu --features import --lib -- --ignored --nocapture import`.
+//! All records changed, until the device is done; llvmpipe of Mesa 22.3.6, two cores shared with other work, best of 40
+//! (`cargo test -p photonstream-renderer-wgpu --features import --lib -- --ignored --nocapture import_against_upload`):
+//!
+//! | records | import, once | `copy_newest` | read by the CPU + `write_buffer` |
+//! |---|---|---|---|
+//! | 1 000 | 0.05 ms | 0.04 ms | 0.003 + 0.03 ms |
+//! | 10 000 | 0.04 ms | 0.23 ms | 0.06 + 0.26 ms |
+//! | 100 000 | 0.06 ms | 1.0 ms | 1.1 + 1.4 ms |
 
 #[cfg(test)]
 mod tests;

@@ -52,6 +52,15 @@ impl Channel {
     }
 }
 
+/// Sets its flag when dropped.
+struct Stopping<'a>(&'a AtomicBool);
+
+impl Drop for Stopping<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Every word of frame `frame` follows from the frame and its place.
 fn records(count: usize, frame: u64) -> Vec<VslRecord> {
     let f = frame as f32;
@@ -132,6 +141,8 @@ fn nothing_is_torn_while_a_publisher_races() {
                 std::thread::sleep(Duration::from_micros(frame % 16 * 100));
             }
         });
+        // Also where an assertion fails: the publisher has to end, or the scope never does.
+        let _stopping = Stopping(stop);
         let end = Instant::now() + Duration::from_millis(1_500);
         while Instant::now() < end {
             let Some(frame) = imported.copy_newest(&gpu).unwrap() else { continue };
@@ -139,7 +150,6 @@ fn nothing_is_torn_while_a_publisher_races() {
             (frames, last) = (frames + 1, frame);
             assert!(copied(&gpu, &imported) == records(COUNT, frame), "frame {frame} is torn");
         }
-        stop.store(true, Ordering::Relaxed);
     });
     assert!(frames > 3, "{frames} frames, {} dropped", imported.dropped());
 }

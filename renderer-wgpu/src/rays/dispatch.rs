@@ -1,6 +1,6 @@
 //! Turns a pass over millions of rays into dispatches, none of which takes many turns of loops in one invocation.
 
-use super::{RAY_STACK, Rays, Traced};
+use super::{RAY_STACK, RAY_TURNS, Rays, Traced};
 use crate::{
     Gpu, GpuError,
     layout::{PixelRays, RaysDispatch},
@@ -184,14 +184,20 @@ impl Rays {
             unfinished = self.submit(gpu, workspace, pass.inputs, steps_now, traced)?;
         }
         // Pixels whose rays took long; each dispatch brings each of them forward.
-        let mut more = 1;
+        let (mut more, mut left) = (1, self.most_dispatches(pass.items));
         while unfinished > 0 {
+            if left == 0 {
+                let reason =
+                    format!("the rays of {unfinished} pixels do not end: its driver stops loops early");
+                return Err(GpuError::Device { reason });
+            }
             if pass.watch.check().is_err() {
                 traced.stopped = true;
                 return Ok(());
             }
             let steps: Vec<_> = (0..more).map(|_| trace(pass.items)).collect();
             unfinished = self.submit(gpu, workspace, pass.inputs, &steps, traced)?;
+            left = left.saturating_sub(more as u64);
             more = (more * 2).min(DISPATCHES as usize);
         }
         if let Some((pipeline, sums)) = pass.sum_rows {
@@ -199,6 +205,14 @@ impl Rays {
             self.submit(gpu, workspace, sums, &[step], traced)?;
         }
         Ok(())
+    }
+
+    /// More dispatches than the rays to `items` can need: a ray takes at most two turns for each node and one for each
+    /// triangle, and a dispatch does at least half of its turns or all that is left.
+    fn most_dispatches(&self, items: u32) -> u64 {
+        let (nodes, triangles) = (self.nodes.size() / 80, self.triangles.size() / 48);
+        let turns = u64::from(items).saturating_mul(2 * nodes + triangles + 64);
+        turns / u64::from(RAY_TURNS / 2) + u64::from(RAY_STACK)
     }
 
     /// Runs `steps` and waits; returns the number of pixels that the last one left unfinished.

@@ -170,6 +170,33 @@ fn odd_sets_of_triangles_make_sound_trees() {
     }
 }
 
+/// Nodes and triangles beyond a binding, and a tree deeper than the stack: named, with the limit. Limits are asked of the
+/// device, 128 MiB on the software rasteriser.
+#[test]
+fn what_is_too_large_is_named() {
+    let Some(gpu) = gpu() else { return };
+    let limits = gpu.device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    if limit > 1 << 30 {
+        crate::test_gpu::skip("one binding of it takes more than this test wants to allocate");
+        return;
+    }
+    let sound = || Tree::new(&Geometry::default());
+    assert!(check_size(&gpu, &sound()).is_ok());
+    let mut nodes = sound();
+    nodes.nodes.resize(limit as usize / 80 + 1, Default::default());
+    let mut triangles = sound();
+    triangles.triangles.resize(limit as usize / 48 + 1, [[0.0; 4]; 3]);
+    let deep = Tree { depth: RAY_STACK + 1, ..sound() };
+    for (tree, named) in [(nodes, "nodes"), (triangles, "triangles"), (deep, "levels")] {
+        let error = check_size(&gpu, &tree).unwrap_err();
+        assert!(
+            matches!(&error, GpuError::TooLarge { what, found, limit, .. } if what.contains(named) && found > limit),
+            "{error}"
+        );
+    }
+}
+
 /// `cargo test --release -p photonstream-renderer-wgpu --lib -- --ignored --nocapture rays_per_second`
 #[test]
 #[ignore = "measures"]
@@ -177,6 +204,9 @@ fn rays_per_second() {
     let Some(gpu) = gpu() else { return };
     for name in ["cornell-box.toml", "cornell-knot.toml"] {
         let scene = config(name);
+        let start = std::time::Instant::now();
+        let tree = Tree::new(&scene.geometry);
+        println!("{name}: {} levels, built in {:.0} ms", tree.depth, start.elapsed().as_secs_f64() * 1e3);
         for run in [1, 4_096] {
             let queries = segments(&scene, 1 << 20, run);
             let (found, seconds) = device(&gpu, &scene, &queries, true);
