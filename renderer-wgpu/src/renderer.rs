@@ -172,6 +172,17 @@ impl Renderer {
         Ok(upload)
     }
 
+    /// Takes over the records of an imported segment, which never were in this process's memory.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    #[cfg(all(feature = "import", unix))]
+    pub fn set_imported(&mut self, segment: &crate::ImportedSegment) -> Result<(), GpuError> {
+        self.vsls.take(&self.gpu, segment.records(), segment.count())?;
+        self.versions.vsls += 1;
+        Ok(())
+    }
+
     /// Draws `view`, or what of it changed since the last one.
     ///
     /// # Errors
@@ -297,7 +308,8 @@ impl Renderer {
             done.set(Stage::Openness, view, versions);
         }
         if (view.needs_owner() || view.show == Show::Discs) && done.is_stale(Stage::Owners, view, versions) {
-            self.owners.update(&self.gpu, &self.vsls.mirror, view.show, self.vsls.batches());
+            let batches = self.vsls.batches();
+            self.owners.update(&self.gpu, self.vsls.mirror(&self.gpu)?, view.show, batches);
             if view.needs_owner() {
                 self.owners.encode_owners(&mut scope, targets, &self.vsls);
             }

@@ -31,8 +31,8 @@ pub(crate) struct VslBuffer {
     pub(crate) lights: wgpu::Buffer,
     refused: wgpu::Buffer,
     pub(crate) count: u32,
-    /// The records as they were uploaded.
-    pub(crate) mirror: Vec<VslRecord>,
+    /// The records as they were uploaded; `None` where they came to the device without this process.
+    mirror: Option<Vec<VslRecord>>,
     /// Segment and number of the frame that is uploaded.
     seen: Option<(u64, u64)>,
 }
@@ -48,7 +48,7 @@ impl VslBuffer {
             lights: buffer(gpu, "virtual surface lights", batches_bytes(0), LIGHTS),
             refused: buffer(gpu, "records refused", 4, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             count: 0,
-            mirror: Vec::new(),
+            mirror: None,
             seen: None,
         }
     }
@@ -72,11 +72,14 @@ impl VslBuffer {
         let complete = !follows || self.count != count;
         self.count = count;
         let since = self.seen.replace((frame.epoch, frame.frame)).map_or(0, |(_, last)| last);
+        // After records that this process has not seen, all are sent.
+        let complete = complete || self.mirror.is_none();
         let mut upload = Upload { complete, ..Upload::default() };
-        self.mirror.resize_with(frame.vsls.len(), VslRecord::default);
+        let mirror = self.mirror.get_or_insert_default();
+        mirror.resize_with(frame.vsls.len(), VslRecord::default);
         let mut send = |range: Range<usize>| {
             let records = &frame.vsls[range.clone()];
-            self.mirror[range.clone()].copy_from_slice(records);
+            mirror[range.clone()].copy_from_slice(records);
             gpu.queue.write_buffer(
                 &self.records,
                 (range.start * size_of::<VslRecord>()) as u64,
@@ -95,6 +98,32 @@ impl VslBuffer {
             send(range);
         }
         Ok(upload)
+    }
+
+    /// Takes over `count` records that are on the device already.
+    #[cfg(all(feature = "import", unix))]
+    pub(crate) fn take(&mut self, gpu: &Gpu, records: &wgpu::Buffer, count: u32) -> Result<(), GpuError> {
+        self.reserve(gpu, count)?;
+        let bytes = u64::from(count) * size_of::<VslRecord>() as u64;
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        if bytes > 0 {
+            encoder.copy_buffer_to_buffer(records, 0, &self.records, 0, bytes);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        (self.count, self.seen, self.mirror) = (count, None, None);
+        Ok(())
+    }
+
+    /// The records in this process; read from the device where they came there without it.
+    pub(crate) fn mirror(&mut self, gpu: &Gpu) -> Result<&[VslRecord], GpuError> {
+        if self.mirror.is_none() {
+            let mut records: Vec<VslRecord> = readback::buffer(gpu, &self.records)?;
+            records.truncate(self.count as usize);
+            self.mirror = Some(records);
+            // The next frame may have other changes than those since this one.
+            self.seen = None;
+        }
+        Ok(self.mirror.as_deref().unwrap_or_default())
     }
 
     fn reserve(&mut self, gpu: &Gpu, count: u32) -> Result<(), GpuError> {
@@ -138,7 +167,7 @@ impl VslBuffer {
     }
 }
 
-const RECORDS: BufferUsages = BufferUsages::STORAGE;
+const RECORDS: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_SRC);
 const LIGHTS: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::UNIFORM).union(BufferUsages::COPY_SRC);
 
 fn batches_bytes(count: u32) -> u64 {

@@ -19,6 +19,8 @@
 //! | 100 000 | 0.06 ms | 1.0 ms | 1.1 + 1.4 ms |
 
 #[cfg(test)]
+mod picture_tests;
+#[cfg(test)]
 mod tests;
 mod vulkan;
 

@@ -13,7 +13,7 @@ use photonstream_protocol::{
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-fn importing() -> Option<Gpu> {
+pub(super) fn importing() -> Option<Gpu> {
     match Gpu::headless_importing(&AdapterChoice { name: None, software: true }) {
         Ok(gpu) => Some(gpu),
         Err(error) => {
@@ -23,15 +23,15 @@ fn importing() -> Option<Gpu> {
     }
 }
 
-struct Channel {
+pub(super) struct Channel {
     _root: tempfile::TempDir,
     runtime: Runtime,
     name: ChannelName,
-    publisher: Publisher,
+    pub(super) publisher: Publisher,
 }
 
 impl Channel {
-    fn new(capacity: u32) -> Self {
+    pub(super) fn new(capacity: u32) -> Self {
         let root = tempfile::tempdir().unwrap();
         let runtime = Runtime::at(root.path());
         let name: ChannelName = "import".parse().unwrap();
@@ -47,7 +47,7 @@ impl Channel {
         Self { _root: root, runtime, name, publisher }
     }
 
-    fn subscriber(&self, mode: AccessMode) -> Subscriber {
+    pub(super) fn subscriber(&self, mode: AccessMode) -> Subscriber {
         Subscriber::attach_in(&self.runtime, &self.name, mode).unwrap()
     }
 }
@@ -79,7 +79,7 @@ fn records(count: usize, frame: u64) -> Vec<VslRecord> {
         .collect()
 }
 
-fn publish(publisher: &mut Publisher, vsls: &[VslRecord]) -> u64 {
+pub(super) fn publish(publisher: &mut Publisher, vsls: &[VslRecord]) -> u64 {
     let mut changed = ChunkSet::for_records(vsls.len());
     (0..vsls.len().div_ceil(64)).for_each(|chunk| changed.insert(chunk));
     let source = FrameSource {
