@@ -6,8 +6,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 /// Dynamic global illumination, simulated once and shown anywhere
 ///
 /// A simulator process streams photons through a scene and publishes the light that leaves its surfaces; any number of
-/// renderer processes make pictures of it. Without a command the built-in Cornell box is simulated and its picture
-/// written to out/.
+/// renderer processes make pictures of it. Without a command the built-in Cornell box is simulated and shown in a
+/// window; without a display or a graphics adapter its picture is written to out/.
 #[derive(Parser)]
 #[command(name = "photonstream", version, after_help = AFTER_HELP, after_long_help = AFTER_HELP)]
 pub(crate) struct Program {
@@ -22,7 +22,7 @@ pub(crate) struct Program {
 /// Examples and exit codes.
 pub(crate) const AFTER_HELP: &str = "\
 Examples:
-  photonstream                                       a picture of the built-in scene, in out/
+  photonstream                                       the built-in scene in a window, or a picture in out/
   photonstream render room.toml --out room.png       a picture of a scene
   photonstream run room.toml --frames 20 --out film  pictures while the light settles
   photonstream check room.toml                       is the scene valid, and what will be modelled?
@@ -59,6 +59,9 @@ pub(crate) enum Command {
     Simulate(simulate::Args),
     /// Make one picture of a scene, or of a running simulation
     Render(render::Args),
+    /// Show a running simulation in a window
+    #[cfg(feature = "window")]
+    View(view::Args),
     /// Path-trace the true picture of a scene
     Reference(reference::Args),
     /// Say how far a picture is from another

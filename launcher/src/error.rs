@@ -24,6 +24,10 @@ pub(crate) enum LauncherError {
     /// The renderer.
     #[error(transparent)]
     Render(RenderError),
+    /// The window.
+    #[cfg(feature = "window")]
+    #[error(transparent)]
+    Window(#[from] photonstream_window::WindowError),
     /// A picture.
     #[error(transparent)]
     Film(#[from] FilmError),

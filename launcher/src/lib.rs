@@ -18,6 +18,7 @@ mod pictures;
 mod progress;
 mod signals;
 mod supervise;
+mod window;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -1,7 +1,17 @@
-//! Turns a bare `photonstream` into a picture of the built-in Cornell box.
+//! Turns a bare `photonstream` into the built-in Cornell box: in a window, or as a picture where there can be none.
 
-use super::render::{self, Simulated};
-use crate::{cli::Global, error::LauncherError, output, pictures::Look};
+use super::{
+    render::{self, Simulated},
+    run,
+};
+use crate::{
+    backend::GpuArgs,
+    cli::Global,
+    error::LauncherError,
+    output,
+    pictures::Look,
+    window::{self, WINDOW},
+};
 use photonstream_renderer::LayerKind;
 use photonstream_renderer_cpu::CpuRenderer;
 use photonstream_simulator::cli::Overrides;
@@ -18,9 +28,12 @@ const OUT: &str = "out";
 
 pub(crate) fn run(global: &Global) -> Result<(), LauncherError> {
     let begun = Instant::now();
-    tracing::info!(
-        "no window renderer in this build: rendering the built-in Cornell box on the CPU, without a window"
-    );
+    match window::find(&GpuArgs::default()) {
+        Ok(()) => return run::show(&run::Args::built_in(), &[WINDOW.to_owned()], global),
+        Err(reason) => {
+            tracing::info!("rendering the built-in Cornell box on the CPU, without a window: {reason}")
+        }
+    }
     let scene = BuiltInScene::new()?;
     let outs = ["exr", "png"].map(|end| PathBuf::from(OUT).join("cornell-box").with_extension(end));
     let overrides = Overrides::default();

@@ -12,6 +12,8 @@ pub(crate) mod render;
 pub(crate) mod renderer;
 pub(crate) mod run;
 pub(crate) mod simulate;
+#[cfg(feature = "window")]
+pub(crate) mod view;
 
 use crate::{
     cli::{Command, Program},
@@ -28,6 +30,8 @@ pub(crate) fn dispatch(program: Program) -> Result<(), LauncherError> {
         None => default_run::run(global),
         Some(Command::Run(args)) => run::run(&args, global),
         Some(Command::Simulate(args)) => simulate::run(&args, global),
+        #[cfg(feature = "window")]
+        Some(Command::View(args)) => view::run(&args, global),
         Some(Command::Render(args)) => render::run(&args, global),
         Some(Command::Reference(args)) => reference::run(&args, global),
         Some(Command::Compare(args)) => compare::run(&args, global),

@@ -8,6 +8,7 @@ use crate::{
     follow, output,
     pictures::Look,
     supervise::{ChildOutput, Kind, Role, Sequence, Supervisor, find_plug_in, written_since},
+    window::{self, WINDOW},
 };
 use photonstream_protocol::ChannelName;
 use photonstream_scene::SceneConfig;
@@ -25,7 +26,8 @@ use std::{
 A renderer NAME that is not built in (cpu, wgpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
 called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V].
 What crashes is started again; a built-in renderer then goes on with the next picture. Several renderers write to folders of their own in DIR.
-Ctrl-C ends all processes in order, a second one at once.
+Without --renderer and --headless a window shows the light, if there is a display and a graphics adapter; closing it ends
+the run. Ctrl-C ends all processes in order, a second one at once.
 
 Examples:
   photonstream run configs/cornell-box.toml
@@ -37,10 +39,11 @@ JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers
 pub(crate) struct Args {
     /// Scene [default: the built-in Cornell box]
     config: Option<PathBuf>,
-    /// Renderer, built in (cpu, wgpu) or a plug-in; may be given several times
-    #[arg(long = "renderer", value_name = "NAME", default_value = "cpu")]
+    /// Renderer, built in (cpu, wgpu) or a plug-in; may be given several times [default: a window where there is a
+    /// display, else cpu]
+    #[arg(long = "renderer", value_name = "NAME")]
     renderers: Vec<String>,
-    /// Without a window (this build has none)
+    /// Without a window
     #[arg(long)]
     headless: bool,
     /// End after so many pictures of each renderer [default: one, once the light has converged]
@@ -83,7 +86,29 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The same, until there is a first frame.
 const FIRST_LOOK: Duration = Duration::from_millis(4);
 
+impl Args {
+    /// The built-in scene, with all defaults.
+    pub(crate) fn built_in() -> Self {
+        Self {
+            config: None,
+            renderers: Vec::new(),
+            headless: false,
+            frames: None,
+            out: "out".into(),
+            channel: None,
+            look: Look::default(),
+            gpu: GpuArgs::default(),
+            overrides: Overrides::default(),
+        }
+    }
+}
+
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
+    show(args, &names(args)?, global)
+}
+
+/// Runs the renderers called `names`, which may be [`WINDOW`].
+pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(), LauncherError> {
     let begun = (Instant::now(), SystemTime::now());
     let built_in = super::default_run::BuiltInScene::new_if(args.config.is_none())?;
     let config = match (&args.config, &built_in) {
@@ -96,21 +121,14 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         None => format!("run-{}", std::process::id()).parse()?,
     };
     // Mistakes are told at once, by this process, before anything is started.
-    backend::check(args.renderers.iter().map(String::as_str), &args.gpu)?;
     let scene = scene_name(config, &SceneConfig::from_file(config)?);
-    let folders = folders(&args.out, &args.renderers);
-    let named = args.renderers.iter().zip(&folders);
+    let folders = folders(&args.out, names);
+    let named = names.iter().zip(&folders);
     let renderers = named
-        .map(|(name, folder)| renderer(name, folder, &channel, begun.1, args, global))
+        .map(|(name, folder)| renderer(name, names.len(), folder, &channel, begun.1, args, global))
         .collect::<Result<_, _>>()?;
     for folder in &folders {
         std::fs::create_dir_all(folder).map_err(|e| LauncherError::io("create folder", folder, e))?;
-    }
-    if !args.headless {
-        tracing::info!(
-            "no window renderer in this build: running without a window, pictures go to {}",
-            args.out.display()
-        );
     }
     let output = if global.json { ChildOutput::Aside } else { ChildOutput::Through };
     let mut supervisor = Supervisor::new(output)?;
@@ -123,7 +141,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     }
     result?;
     let fates = supervisor.fates(Kind::Renderer);
-    let renderers = args.renderers.iter().zip(folders).zip(fates).map(|((name, folder), fate)| Renderer {
+    let renderers = names.iter().zip(folders).zip(fates).map(|((name, folder), fate)| Renderer {
         name: name.clone(),
         pictures: pictures_in(&folder, begun.1),
         folder,
@@ -139,6 +157,24 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     };
     output::report(global.json, &report, text)?;
     supervisor.take_failure().map_or(Ok(()), Err)
+}
+
+/// What is started to show the light: the renderers that were named, else a window if there can be one, else `cpu`.
+fn names(args: &Args) -> Result<Vec<String>, LauncherError> {
+    if !args.renderers.is_empty() || args.headless {
+        let names = if args.renderers.is_empty() { vec!["cpu".to_owned()] } else { args.renderers.clone() };
+        backend::check(names.iter().map(String::as_str), &args.gpu)?;
+        return Ok(names);
+    }
+    match window::find(&args.gpu) {
+        Ok(()) => Ok(vec![WINDOW.to_owned()]),
+        Err(reason) => {
+            backend::check(["cpu"], &args.gpu)?;
+            let out = args.out.display();
+            tracing::info!("rendering on the CPU, without a window: {reason}; pictures go to {out}");
+            Ok(vec!["cpu".to_owned()])
+        }
+    }
 }
 
 /// Starts `renderers` once the channel is there; until all of them are done, or the simulation and then they.
@@ -187,6 +223,7 @@ fn scene_name(config: &Path, parsed: &SceneConfig) -> String {
 /// A renderer as a process.
 fn renderer(
     name: &str,
+    of: usize,
     folder: &Path,
     channel: &ChannelName,
     begun: SystemTime,
@@ -194,7 +231,12 @@ fn renderer(
     global: &Global,
 ) -> Result<Role, LauncherError> {
     let mut arguments: Vec<OsString> = Vec::new();
-    let plug_in = if BUILT_IN_RENDERERS.contains(&name) {
+    let is_window = name == WINDOW && args.renderers.is_empty();
+    let plug_in = if is_window {
+        arguments.push("view".into());
+        arguments.extend(verbosity(global));
+        None
+    } else if BUILT_IN_RENDERERS.contains(&name) {
         arguments.extend(["renderer".into(), name.into()]);
         arguments.extend(verbosity(global));
         None
@@ -202,25 +244,23 @@ fn renderer(
         Some(find_plug_in(name)?)
     };
     arguments.extend(["--channel".into(), channel.as_str().into(), "--out".into(), folder.into()]);
-    arguments.push("--headless".into());
+    if !is_window {
+        arguments.push("--headless".into());
+    }
     // A plug-in numbers its pictures, if it has any, in its own way.
     let sequence = match &plug_in {
-        None => Some(Sequence { folder: folder.to_owned(), begun, frames: args.frames }),
-        Some(_) => {
+        None if !is_window => Some(Sequence { folder: folder.to_owned(), begun, frames: args.frames }),
+        _ => {
             arguments.extend(args.frames.iter().flat_map(|n| ["--frames".into(), n.to_string().into()]));
             None
         }
     };
     arguments.extend(args.look.to_arguments().into_iter().map(OsString::from));
-    if name == "wgpu" {
+    if name == "wgpu" || is_window {
         arguments.extend(args.gpu.to_arguments().into_iter().map(OsString::from));
     }
     // With several renderers their folders are named after them, and told apart.
-    let shown = if args.renderers.len() == 1 {
-        name.into()
-    } else {
-        folder.file_name().unwrap_or_default().to_string_lossy()
-    };
+    let shown = if of == 1 { name.into() } else { folder.file_name().unwrap_or_default().to_string_lossy() };
     Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments, sequence })
 }
 

@@ -7,7 +7,7 @@ use crate::{
     session::{Selected, Session},
     standing::Standing,
 };
-use egui::{Context, DragValue, Slider, Ui, pos2};
+use egui::{Align2, Context, DragValue, Slider, Ui, pos2};
 use glam::{DVec3, Vec3};
 use photonstream_protocol::Request;
 use photonstream_scene::{LightId, ObjectId};
@@ -42,9 +42,10 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
         Selected::Light(name) => format!("Light {name}"),
         Selected::Object(name) => format!("Object {name}"),
     };
-    let place = pos2(8.0, 390.0);
+    let place = pos2(8.0, ctx.content_rect().bottom() - 8.0);
     let mut requests = Vec::new();
-    window("selection", place).title_bar(false).default_width(234.0).show(ctx, |ui| {
+    let frame = window("selection", place).pivot(Align2::LEFT_BOTTOM).title_bar(false).default_width(234.0);
+    frame.show(ctx, |ui| {
         ui.strong(title);
         match &selected {
             Selected::Light(name) => light(ui, name, &published, draft, &mut requests),
