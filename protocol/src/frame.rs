@@ -26,6 +26,8 @@ pub struct VslFrame {
     pub scene_hash: u64,
     /// Virtual surface lights.
     pub vsls: Vec<VslRecord>,
+    /// Frame in which each chunk of [`CHUNK_RECORDS`] lights last changed: `VslRecord::changed_frame` of its records.
+    pub chunk_frames: Vec<u64>,
     /// Objects.
     pub objects: Vec<ObjectRecord>,
     /// Lights.
@@ -167,6 +169,7 @@ impl FramePair {
             }
             self.patch.clear();
         }
+        back.frame.chunk_frames.clone_from(&back.versions[VSL]);
         let frame = &mut back.frame;
         frame.scene_text = text;
         frame.epoch = epoch;

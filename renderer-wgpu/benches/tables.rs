@@ -197,7 +197,7 @@ fn uploads(gpu: &Gpu) {
                     change(&mut frame);
                     let start = Instant::now();
                     assert!(renderer.set_frame(&frame).unwrap().records > 0);
-                    gpu.queue.submit([]);
+                    renderer.flush();
                     gpu.wait().unwrap();
                     start.elapsed().as_secs_f64() * 1e3
                 })
@@ -212,6 +212,7 @@ fn uploads(gpu: &Gpu) {
             for chunk in frame.vsls.chunks_mut(64).step_by(50) {
                 chunk.iter_mut().for_each(|r| r.changed_frame = number);
             }
+            frame.chunk_frames = frame.vsls.chunks(64).map(|chunk| chunk[0].changed_frame).collect();
         });
         println!("| {vsls} | {all:.3} | {some:.3} | {:.1} % |", some / all * 100.0);
     }

@@ -4,7 +4,7 @@ use crate::{
     Accumulation, Gpu, GpuError,
     deferred::depth_test,
     geometry::{self, Geometry},
-    layout::{BATCH_LIGHTS, BATCH_WORDS, Corner, TILE_EDGE, TileBounds},
+    layout::{BATCH_WORDS, Corner, TILE_EDGE, TileBounds},
     pipelines::{self, Drawing, groups_of_64, part, texture, whole},
     readback,
     scope::{Edge, Scope},
@@ -204,10 +204,16 @@ impl Gather {
             part(&lights.lights, offset, bytes),
             whole(&self.masks),
             whole(&self.tallies),
+            lights.numbers(batch),
         ];
         let lists = pipelines::bind(scope.gpu, &self.select.get_bind_group_layout(1), &resources);
         let [columns, rows] = tiles(targets.size);
-        scope.compute(edge, &self.select, &[&frame, &lists], groups_of_64(columns * rows * BATCH_WORDS));
+        scope.compute(
+            edge,
+            &self.select,
+            &[&frame, &lists],
+            groups_of_64(columns * rows * lights.batch_numbers(batch).words),
+        );
     }
 
     fn encode_tiled(
@@ -252,11 +258,14 @@ impl Gather {
                 part(&lights.lights, offset, bytes),
                 whole(&self.masks),
                 texture(if first { black } else { from }),
+                // Of the near lights; there is none without interleaving.
+                None,
+                lights.numbers(batch),
             ];
             let edge = Edge { span: shading, first, last };
             match near.filter(|_| interleaved) {
                 Some([near_to, near_from]) => {
-                    resources.push(texture(if first { black } else { near_from }));
+                    resources[5] = texture(if first { black } else { near_from });
                     let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
                     scope.cover_both(edge, pipeline, &group, [to, near_to]);
                 }
@@ -306,7 +315,7 @@ impl Gather {
             let mut pass = scope.render_pass(edge, Some((&targets.indirect.view, load)), depth);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
-            let instances = 0..(lights.count - batch * BATCH_LIGHTS).min(BATCH_LIGHTS);
+            let instances = 0..lights.batch_numbers(batch).lights;
             if forward {
                 geometry.draw(&mut pass, instances, &sees);
             } else {

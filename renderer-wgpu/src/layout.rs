@@ -174,6 +174,14 @@ shared! {
         object: u32,
     }
 
+    /// Twin of `BatchNumbers` in vsl.wgsl.
+    BatchNumbers as "BatchNumbers" {
+        first: u32,
+        is_last: u32,
+        lights: u32,
+        words: u32,
+    }
+
     /// Twin of `TileBounds` in cull.wgsl.
     TileBounds as "TileBounds" {
         lo: [f32; 3],

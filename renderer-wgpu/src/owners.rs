@@ -4,7 +4,6 @@ use crate::{
     Gpu, Show,
     deferred::depth_test,
     geometry,
-    layout::BATCH_LIGHTS,
     pipelines::{self, Drawing, part, texture, whole},
     scope::{Edge, Scope},
     shader,
@@ -17,9 +16,6 @@ use photonstream_protocol::VslRecord;
 use photonstream_renderer::{LayerKind, owner};
 use wgpu::{BufferUsages, LoadOp};
 
-/// Distance between two blocks of batch numbers: what every device takes as an offset.
-const BLOCK: u64 = 256;
-
 /// Passes that show lights themselves.
 #[derive(Debug)]
 pub(crate) struct Owners {
@@ -27,8 +23,6 @@ pub(crate) struct Owners {
     discs: wgpu::RenderPipeline,
     /// A colour for each light, and the radius of its disc.
     pub(crate) colours: wgpu::Buffer,
-    /// First light of each batch, and whether it is the last batch.
-    batches: wgpu::Buffer,
 }
 
 impl Owners {
@@ -48,12 +42,11 @@ impl Owners {
             find,
             discs: pipelines::drawing(gpu, &shader::DISC, &set),
             colours: geometry::buffer(gpu, "colours of lights", 16, BufferUsages::STORAGE),
-            batches: geometry::buffer(gpu, "batches", BLOCK, BufferUsages::UNIFORM),
         }
     }
 
     /// Uploads the colours that `show` needs.
-    pub(crate) fn update(&mut self, gpu: &Gpu, records: &[VslRecord], show: Show, batches: u32) {
+    pub(crate) fn update(&mut self, gpu: &Gpu, records: &[VslRecord], show: Show) {
         let colours: Vec<_> = records
             .iter()
             .enumerate()
@@ -64,16 +57,6 @@ impl Owners {
             self.colours = geometry::buffer(gpu, "colours of lights", bytes, BufferUsages::STORAGE);
         }
         gpu.queue.write_buffer(&self.colours, 0, bytemuck::cast_slice(&colours));
-        let mut blocks = vec![0u8; batches as usize * BLOCK as usize];
-        for (index, block) in blocks.chunks_exact_mut(BLOCK as usize).enumerate() {
-            let index = index as u32;
-            let numbers = [index * BATCH_LIGHTS, u32::from(index + 1 == batches), 0, 0];
-            block[..16].copy_from_slice(bytemuck::cast_slice(&numbers));
-        }
-        if self.batches.size() < blocks.len() as u64 {
-            self.batches = geometry::buffer(gpu, "batches", blocks.len() as u64, BufferUsages::UNIFORM);
-        }
-        gpu.queue.write_buffer(&self.batches, 0, &blocks);
     }
 
     /// Finds the owner of each pixel; the texture that holds it is number 0 of `targets.owners`.
@@ -92,7 +75,7 @@ impl Owners {
                 texture(&targets.gbuffer.view),
                 part(&lights.lights, offset, bytes),
                 texture(&owners[1 - to].view),
-                part(&self.batches, u64::from(batch) * BLOCK, 16),
+                lights.numbers(batch),
             ];
             let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
             let edge = Edge { span, first: batch == 0, last: batch + 1 == batches };
@@ -110,7 +93,7 @@ impl Owners {
                 whole(scope.frame),
                 part(&lights.lights, offset, bytes),
                 whole(&self.colours),
-                part(&self.batches, u64::from(batch) * BLOCK, 16),
+                lights.numbers(batch),
             ];
             let group = pipelines::bind(scope.gpu, &self.discs.get_bind_group_layout(0), &resources);
             let edge = Edge { span, first: batch == 0, last: batch + 1 == batches };
@@ -118,7 +101,7 @@ impl Owners {
             let mut pass = scope.render_pass(edge, target, Some((&targets.depth.view, LoadOp::Load)));
             pass.set_pipeline(&self.discs);
             pass.set_bind_group(0, &group, &[]);
-            pass.draw(0..4, 0..(lights.count - batch * BATCH_LIGHTS).min(BATCH_LIGHTS));
+            pass.draw(0..4, 0..lights.batch_numbers(batch).lights);
         }
     }
 }

@@ -183,6 +183,14 @@ impl Renderer {
         Ok(())
     }
 
+    /// Gives the device at once what [`Renderer::set_frame`] left for the next picture.
+    pub fn flush(&mut self) {
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.vsls.flush(&mut encoder);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.submissions += 1;
+    }
+
     /// Draws `view`, or what of it changed since the last one.
     ///
     /// # Errors
@@ -308,8 +316,7 @@ impl Renderer {
             done.set(Stage::Openness, view, versions);
         }
         if (view.needs_owner() || view.show == Show::Discs) && done.is_stale(Stage::Owners, view, versions) {
-            let batches = self.vsls.batches();
-            self.owners.update(&self.gpu, self.vsls.mirror(&self.gpu)?, view.show, batches);
+            self.owners.update(&self.gpu, self.vsls.mirror(&self.gpu)?, view.show);
             if view.needs_owner() {
                 self.owners.encode_owners(&mut scope, targets, &self.vsls);
             }

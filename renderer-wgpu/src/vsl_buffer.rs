@@ -3,7 +3,7 @@
 use crate::{
     Gpu, GpuError,
     geometry::buffer,
-    layout::{BATCH_LIGHTS, VslUniform},
+    layout::{BATCH_LIGHTS, BatchNumbers, VslUniform},
     pipelines::{self, groups_of_64, whole},
     readback, shader,
 };
@@ -30,6 +30,12 @@ pub(crate) struct VslBuffer {
     /// Lights as shaders read them, in whole batches; those beyond the last are dark.
     pub(crate) lights: wgpu::Buffer,
     refused: wgpu::Buffer,
+    /// [`BatchNumbers`] of each batch, [`NUMBERS_STRIDE`] apart.
+    numbers: wgpu::Buffer,
+    /// Where changed records lie before the device puts each in its place.
+    staging: Option<wgpu::Buffer>,
+    /// The places of the records in `staging`, one after the other, until [`VslBuffer::flush`].
+    pending: Vec<Range<usize>>,
     pub(crate) count: u32,
     /// The records as they were uploaded; `None` where they came to the device without this process.
     mirror: Option<Vec<VslRecord>>,
@@ -37,6 +43,10 @@ pub(crate) struct VslBuffer {
     seen: Option<(u64, u64)>,
 }
 
+/// Distance between two in a buffer of uniforms: what every device takes as an offset.
+const NUMBERS_STRIDE: u64 = 256;
+/// Bytes of a record.
+const RECORD_BYTES: u64 = size_of::<VslRecord>() as u64;
 /// Records between two that may have changed apart.
 const CHUNK: usize = photonstream_protocol::CHUNK_RECORDS;
 
@@ -47,6 +57,9 @@ impl VslBuffer {
             records: buffer(gpu, "records", size_of::<VslRecord>() as u64, RECORDS),
             lights: buffer(gpu, "virtual surface lights", batches_bytes(0), LIGHTS),
             refused: buffer(gpu, "records refused", 4, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            numbers: buffer(gpu, "batches", NUMBERS_STRIDE, BufferUsages::UNIFORM),
+            staging: None,
+            pending: Vec::new(),
             count: 0,
             mirror: None,
             seen: None,
@@ -64,45 +77,120 @@ impl VslBuffer {
         (u64::from(index) * bytes, bytes)
     }
 
+    /// What is said of a batch.
+    pub(crate) fn batch_numbers(&self, index: u32) -> BatchNumbers {
+        let first = index * BATCH_LIGHTS;
+        let lights = self.count.saturating_sub(first).min(BATCH_LIGHTS);
+        BatchNumbers {
+            first,
+            is_last: u32::from(index + 1 == self.batches()),
+            lights,
+            words: lights.div_ceil(32),
+        }
+    }
+
+    /// The same as a uniform.
+    pub(crate) fn numbers(&self, index: u32) -> Option<wgpu::BindingResource<'_>> {
+        pipelines::part(&self.numbers, u64::from(index) * NUMBERS_STRIDE, size_of::<BatchNumbers>() as u64)
+    }
+
+    fn set_count(&mut self, gpu: &Gpu, count: u32) {
+        self.count = count;
+        let mut blocks = vec![0u8; self.batches() as usize * NUMBERS_STRIDE as usize];
+        for (index, block) in (0..).zip(blocks.chunks_exact_mut(NUMBERS_STRIDE as usize)) {
+            block[..size_of::<BatchNumbers>()]
+                .copy_from_slice(bytemuck::bytes_of(&self.batch_numbers(index)));
+        }
+        if self.numbers.size() < blocks.len() as u64 {
+            self.numbers = buffer(gpu, "batches", blocks.len() as u64, BufferUsages::UNIFORM);
+        }
+        gpu.queue.write_buffer(&self.numbers, 0, &blocks);
+    }
+
     /// Uploads what `frame` changed.
     pub(crate) fn update(&mut self, gpu: &Gpu, frame: &VslFrame) -> Result<Upload, GpuError> {
         let count = frame.vsls.len() as u32;
         self.reserve(gpu, count)?;
         let follows = self.seen.is_some_and(|(epoch, last)| epoch == frame.epoch && last <= frame.frame);
         let complete = !follows || self.count != count;
-        self.count = count;
+        if complete {
+            self.set_count(gpu, count);
+        }
         let since = self.seen.replace((frame.epoch, frame.frame)).map_or(0, |(_, last)| last);
         // After records that this process has not seen, all are sent.
         let complete = complete || self.mirror.is_none();
         let mut upload = Upload { complete, ..Upload::default() };
         let mirror = self.mirror.get_or_insert_default();
         mirror.resize_with(frame.vsls.len(), VslRecord::default);
-        let mut send = |range: Range<usize>| {
-            let records = &frame.vsls[range.clone()];
-            mirror[range.clone()].copy_from_slice(records);
-            gpu.queue.write_buffer(
-                &self.records,
-                (range.start * size_of::<VslRecord>()) as u64,
-                bytemuck::cast_slice(records),
-            );
-            upload.records += records.len() as u64;
-            upload.bytes += size_of_val(records) as u64;
-        };
         if complete {
-            if count > 0 {
-                send(0..count as usize);
+            self.pending.clear();
+            mirror.copy_from_slice(&frame.vsls);
+            gpu.queue.write_buffer(&self.records, 0, bytemuck::cast_slice(&frame.vsls));
+            upload.records = frame.vsls.len() as u64;
+        } else {
+            let runs = changed_runs(frame, since);
+            for run in &runs {
+                mirror[run.clone()].copy_from_slice(&frame.vsls[run.clone()]);
             }
-            return Ok(upload);
+            upload.records = self.send(gpu, &frame.vsls, &runs);
         }
-        for range in changed_runs(&frame.vsls, since) {
-            send(range);
-        }
+        upload.bytes = upload.records * RECORD_BYTES;
         Ok(upload)
+    }
+
+    /// Sends runs of records all at once, to where [`VslBuffer::flush`] takes each from: an upload costs the device's
+    /// library far more than a copy.
+    fn send(&mut self, gpu: &Gpu, records: &[VslRecord], runs: &[Range<usize>]) -> u64 {
+        let packed: Vec<VslRecord> = runs.iter().flat_map(|run| &records[run.clone()]).copied().collect();
+        if packed.is_empty() {
+            return 0;
+        }
+        self.flush_now(gpu);
+        let bytes = packed.len() as u64 * RECORD_BYTES;
+        let staging = match self.staging.take() {
+            Some(buffer) if buffer.size() >= bytes => buffer,
+            _ => buffer(gpu, "records, changed", bytes, BufferUsages::COPY_SRC),
+        };
+        gpu.queue.write_buffer(&staging, 0, bytemuck::cast_slice(&packed));
+        self.pending.extend_from_slice(runs);
+        self.staging = Some(staging);
+        packed.len() as u64
+    }
+
+    /// Has the device put what was sent in its place.
+    pub(crate) fn flush(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        let Some(staging) = &self.staging else { return };
+        let mut from = 0;
+        for run in self.pending.drain(..) {
+            let bytes = run.len() as u64 * RECORD_BYTES;
+            encoder.copy_buffer_to_buffer(
+                staging,
+                from,
+                &self.records,
+                run.start as u64 * RECORD_BYTES,
+                bytes,
+            );
+            from += bytes;
+        }
+    }
+
+    /// Whether anything waits for [`VslBuffer::flush`].
+    pub(crate) fn is_pending(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    fn flush_now(&mut self, gpu: &Gpu) {
+        if self.is_pending() {
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            self.flush(&mut encoder);
+            gpu.queue.submit([encoder.finish()]);
+        }
     }
 
     /// Takes over `count` records that are on the device already.
     #[cfg(all(feature = "import", unix))]
     pub(crate) fn take(&mut self, gpu: &Gpu, records: &wgpu::Buffer, count: u32) -> Result<(), GpuError> {
+        self.pending.clear();
         self.reserve(gpu, count)?;
         let bytes = u64::from(count) * size_of::<VslRecord>() as u64;
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -110,7 +198,8 @@ impl VslBuffer {
             encoder.copy_buffer_to_buffer(records, 0, &self.records, 0, bytes);
         }
         gpu.queue.submit([encoder.finish()]);
-        (self.count, self.seen, self.mirror) = (count, None, None);
+        self.set_count(gpu, count);
+        (self.seen, self.mirror) = (None, None);
         Ok(())
     }
 
@@ -146,7 +235,8 @@ impl VslBuffer {
     }
 
     /// Unpacks the records for the kernel and range of the frame uniform.
-    pub(crate) fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, frame: &wgpu::Buffer) {
+    pub(crate) fn encode(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, frame: &wgpu::Buffer) {
+        self.flush(encoder);
         encoder.clear_buffer(&self.refused, 0, None);
         let layout = self.unpack.get_bind_group_layout(0);
         let resources = [whole(frame), whole(&self.records), whole(&self.lights), whole(&self.refused)];
@@ -175,17 +265,22 @@ fn batches_bytes(count: u32) -> u64 {
 }
 
 /// Runs of records whose chunks changed after frame `since`.
-fn changed_runs(records: &[VslRecord], since: u64) -> Vec<Range<usize>> {
+fn changed_runs(frame: &VslFrame, since: u64) -> Vec<Range<usize>> {
+    let count = frame.vsls.len();
     let mut runs: Vec<Range<usize>> = Vec::new();
-    for (index, chunk) in records.chunks(CHUNK).enumerate() {
-        // All records of a chunk say the same.
-        if chunk[0].changed_frame > since {
-            let range = index * CHUNK..index * CHUNK + chunk.len();
-            match runs.last_mut() {
-                Some(last) if last.end == range.start => last.end = range.end,
-                _ => runs.push(range),
-            }
+    let mut add = |chunk: usize| {
+        let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+        match runs.last_mut() {
+            Some(last) if last.end == range.start => last.end = range.end,
+            _ => runs.push(range),
         }
+    };
+    let chunks = 0..count.div_ceil(CHUNK);
+    if frame.chunk_frames.len() == chunks.len() {
+        chunks.filter(|&chunk| frame.chunk_frames[chunk] > since).for_each(&mut add);
+    } else {
+        // A frame that was put together by hand: all records of a chunk say the same.
+        chunks.filter(|&chunk| frame.vsls[chunk * CHUNK].changed_frame > since).for_each(&mut add);
     }
     runs
 }
@@ -196,12 +291,19 @@ mod tests {
 
     #[test]
     fn neighbouring_chunks_are_sent_together_and_unchanged_ones_not() {
-        let mut records = vec![VslRecord { changed_frame: 3, ..Default::default() }; CHUNK * 5 + 7];
-        assert_eq!(changed_runs(&records, 3), []);
+        let vsls = vec![VslRecord { changed_frame: 3, ..Default::default() }; CHUNK * 5 + 7];
+        let mut frame = VslFrame { vsls, ..VslFrame::default() };
+        let mut chunk_frames = vec![3; 6];
+        assert_eq!(changed_runs(&frame, 3), []);
         for chunk in [1, 2, 5] {
-            records[chunk * CHUNK].changed_frame = 4;
+            frame.vsls[chunk * CHUNK].changed_frame = 4;
+            chunk_frames[chunk] = 4;
         }
-        assert_eq!(changed_runs(&records, 3), [CHUNK..CHUNK * 3, CHUNK * 5..CHUNK * 5 + 7]);
-        assert_eq!(changed_runs(&records, 2), [0..records.len()]);
+        // The same by the records as by the list of a frame that was read.
+        for chunk_frames in [Vec::new(), chunk_frames] {
+            frame.chunk_frames = chunk_frames;
+            assert_eq!(changed_runs(&frame, 3), [CHUNK..CHUNK * 3, CHUNK * 5..CHUNK * 5 + 7]);
+            assert_eq!(changed_runs(&frame, 2), [0..frame.vsls.len()]);
+        }
     }
 }

@@ -55,15 +55,17 @@ struct Batch {
 // For each word of each tile: upper bound of the radiance that skipped lights would have added, summed over the
 // tile's receivers (W m⁻² sr⁻¹), and number of lights kept; summed over the batches.
 @group(1) @binding(3) var<storage, read_write> tallies: array<vec2f>;
+@group(1) @binding(4) var<uniform> numbers: BatchNumbers;
 
 @compute @workgroup_size(64)
 fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let index = id.y * groups.x * 64u + id.x;
-    if index >= frame.tiles.x * frame.tiles.y * BATCH_WORDS {
+    if index >= frame.tiles.x * frame.tiles.y * numbers.words {
         return;
     }
-    let tile = tiles[index / BATCH_WORDS];
-    let word = index % BATCH_WORDS;
+    let tile = tiles[index / numbers.words];
+    let word = index % numbers.words;
+    let place = index / numbers.words * BATCH_WORDS + word;
     // Lights so near that what they add changes from pixel to pixel: not to be interleaved.
     let away = max(abs(tile.lo - frame.camera.position), abs(tile.hi - frame.camera.position));
     let steep = steep_range(length(away));
@@ -104,9 +106,9 @@ fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
             }
         }
     }
-    masks[index] = mask;
+    masks[place] = mask;
     if frame.interleave > 1u {
-        masks[frame.tiles.x * frame.tiles.y * BATCH_WORDS + index] = near_mask;
+        masks[frame.tiles.x * frame.tiles.y * BATCH_WORDS + place] = near_mask;
     }
-    tallies[index] += vec2f(skipped, f32(countOneBits(mask | near_mask)));
+    tallies[place] += vec2f(skipped, f32(countOneBits(mask | near_mask)));
 }

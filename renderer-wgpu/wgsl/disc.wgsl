@@ -6,7 +6,7 @@ struct Batch {
 
 @group(0) @binding(1) var<uniform> batch: Batch;
 @group(0) @binding(2) var<storage, read> colours: array<vec4f>;
-@group(0) @binding(3) var<uniform> first: vec4u;
+@group(0) @binding(3) var<uniform> numbers: BatchNumbers;
 
 struct Corner {
     @builtin(position) clip: vec4f,
@@ -17,7 +17,7 @@ struct Corner {
 @vertex
 fn quad(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Corner {
     let light = batch.lights[index];
-    let colour = colours[first.x + index];
+    let colour = colours[numbers.first + index];
     let at = vec2f(select(-1.0, 1.0, (vertex & 1u) != 0u), select(-1.0, 1.0, (vertex & 2u) != 0u));
     let helper = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(light.normal.x) > 0.7);
     let across = normalize(cross(helper, light.normal));

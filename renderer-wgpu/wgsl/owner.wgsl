@@ -8,8 +8,7 @@ struct Batch {
 @group(0) @binding(2) var<uniform> batch: Batch;
 // Of earlier batches: squared distance (bits) and index of the best, squared distance and index of the best of the side.
 @group(0) @binding(3) var before: texture_2d<u32>;
-// The index of the batch's first light.
-@group(0) @binding(4) var<uniform> first: vec4u;
+@group(0) @binding(4) var<uniform> numbers: BatchNumbers;
 
 override CONTINUES: bool = false;
 
@@ -28,8 +27,7 @@ fn find(@builtin(position) at: vec4f) -> @location(0) vec4u {
     let word = textureLoad(gbuffer, pixel, 0);
     if surface_is_there(word) {
         let surface = surface_unpack(word, pixel);
-        let count = min(frame.vsls - first.x, BATCH_LIGHTS);
-        for (var i = 0u; i < count; i++) {
+        for (var i = 0u; i < numbers.lights; i++) {
             let light = batch.lights[i];
             let cos_between = dot(light.normal, surface.normal);
             if light.object != surface.object || cos_between <= 0.0 {
@@ -38,15 +36,15 @@ fn find(@builtin(position) at: vec4f) -> @location(0) vec4u {
             let d = light.position - surface.position;
             let distance_sq = dot(d, d);
             if distance_sq < bitcast<f32>(best.z) {
-                best = vec4u(best.xy, bitcast<u32>(distance_sq), first.x + i);
+                best = vec4u(best.xy, bitcast<u32>(distance_sq), numbers.first + i);
             }
             if cos_between >= COMPATIBLE_COS && distance_sq < bitcast<f32>(best.x) {
-                best = vec4u(bitcast<u32>(distance_sq), first.x + i, best.zw);
+                best = vec4u(bitcast<u32>(distance_sq), numbers.first + i, best.zw);
             }
         }
     }
     // After the last batch the shown index is that of the compatible one, else of the side.
-    if first.y == 1u && best.y == NO_OWNER {
+    if numbers.is_last == 1u && best.y == NO_OWNER {
         best.y = best.w;
     }
     return best;

@@ -9,6 +9,7 @@ struct Batch {
 @group(0) @binding(3) var<storage, read> masks: array<u32>;
 @group(0) @binding(4) var before: texture_2d<f32>;
 @group(0) @binding(5) var before_near: texture_2d<f32>;
+@group(0) @binding(6) var<uniform> numbers: BatchNumbers;
 
 // Whether there is irradiance of earlier batches to add to.
 override CONTINUES: bool = false;
@@ -57,7 +58,7 @@ fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
         far += sum_of_list(surface, first, place);
         let steep = steep_range(surface.distance);
         let first_near = frame.tiles.x * frame.tiles.y * BATCH_WORDS + first;
-        for (var i = 0u; i < BATCH_WORDS; i++) {
+        for (var i = 0u; i < numbers.words; i++) {
             var bits = masks[first_near + i];
             while bits != 0u {
                 let bit = firstTrailingBit(bits);
@@ -81,7 +82,7 @@ fn first_word(pixel: vec2u) -> u32 {
 // Irradiance of the lights of a list that are `kept`, a mask of every 32.
 fn sum_of_list(surface: Surface, first: u32, kept: u32) -> vec3f {
     var sum = vec3f(0.0);
-    for (var i = 0u; i < BATCH_WORDS; i++) {
+    for (var i = 0u; i < numbers.words; i++) {
         var bits = masks[first + i] & kept;
         while bits != 0u {
             let light = batch.lights[i * 32u + firstTrailingBit(bits)];

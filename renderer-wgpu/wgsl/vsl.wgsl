@@ -9,6 +9,14 @@ struct Vsl {
     object: u32,
 }
 
+// What is said of a block of lights.
+struct BatchNumbers {
+    first: u32,              // index of its first light
+    is_last: u32,
+    lights: u32,             // number of its lights
+    words: u32,              // words of a list that have any of them
+}
+
 // Irradiance in W m⁻² that `light` adds at a surface.
 fn vsl_irradiance(light: Vsl, position: vec3f, normal: vec3f) -> vec3f {
     let d = light.position - position;

@@ -239,6 +239,8 @@ impl Application {
         let gpu = graphics.renderer.gpu();
         self.machine = Machine { adapter: gpu.name(), is_software: gpu.is_software() };
         tracing::info!("showing pictures of {}", self.machine.adapter);
+        // Who asks for software gets the same picture as anywhere.
+        self.session.eases = self.machine.is_software && !self.session.args.gpu.software;
         self.graphics = Some(graphics);
         Ok(())
     }

@@ -4,7 +4,7 @@ use crate::Args;
 use photonstream_film::Display;
 use photonstream_renderer::LayerKind;
 use photonstream_renderer_wgpu::{Accumulation, Show, View};
-use photonstream_scene::RenderSettings;
+use photonstream_scene::{RenderSettings, Visibility};
 use photonstream_shading::{Camera, tone::ToneMap};
 
 /// What the user has chosen to see.
@@ -29,6 +29,16 @@ impl Choices {
         (view.shadows, view.rays_per_pixel) = (gpu.shadows, gpu.rays_per_pixel);
         view.show = Show::Layer(args.show);
         Self { view, exposure_ev: settings.exposure_ev, tone_map: settings.tone_map }
+    }
+
+    /// Takes the cheaper way where `args` do not say which: ambient occlusion for rays, and interleaved sampling.
+    pub(crate) fn ease(&mut self, args: &Args) {
+        if args.visibility.is_none() && self.view.visibility == Visibility::Rays {
+            self.view.visibility = Visibility::Ao;
+        }
+        if args.gpu.interleave.is_none() {
+            self.view.interleave = 4;
+        }
     }
 
     /// The view from `camera` onto `width` × `height` pixels of a scene with `lights` lights.
@@ -110,6 +120,19 @@ mod tests {
         let view = choices.view(&camera, 30, 20, 2);
         assert_eq!((view.interleave, view.only_light), (1, None));
         assert_eq!(choices.display(), Display::Scaled);
+    }
+
+    #[test]
+    fn software_is_spared_what_nobody_asked_for() {
+        let eased = |line: &str| {
+            let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
+            let (mut choices, _) = choices(line);
+            choices.ease(&args);
+            (choices.view.visibility, choices.view.interleave)
+        };
+        assert_eq!(eased("w"), (Visibility::Ao, 4));
+        assert_eq!(eased("w --visibility rays --interleave 1"), (Visibility::Rays, 1));
+        assert_eq!(eased("w --visibility none"), (Visibility::None, 4));
     }
 
     #[test]

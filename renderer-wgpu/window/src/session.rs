@@ -40,6 +40,8 @@ pub(crate) struct Effort {
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) args: Args,
+    /// Whether what was not asked for is at first what software draws soonest.
+    pub(crate) eases: bool,
     pub(crate) published: Option<Published>,
     pub(crate) connection: Connection,
     pub(crate) problem: Option<String>,
@@ -75,6 +77,7 @@ impl Session {
     pub(crate) fn new(args: Args) -> Self {
         Self {
             args,
+            eases: false,
             published: None,
             connection: Connection::default(),
             problem: None,
@@ -118,6 +121,9 @@ impl Session {
         }
         if self.choices.is_none() {
             self.choices = Some(Choices::new(&scene.render, &scene.camera, &self.args));
+            if self.eases {
+                self.choices.iter_mut().for_each(|choices| choices.ease(&self.args));
+            }
         }
         let is_gone = match &self.selected {
             Some(Selected::Light(name)) => scene.light(name).is_none(),
