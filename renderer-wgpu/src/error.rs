@@ -61,7 +61,7 @@ pub enum GpuError {
         reason: String,
     },
     /// The device reported an error: a bug of this renderer or of the driver, or memory has run out.
-    #[error("the graphics device reported: {reason}")]
+    #[error("the graphics device reported: {reason}; try another --adapter, --software or --renderer cpu")]
     Device {
         /// What it said.
         reason: String,

@@ -33,6 +33,8 @@ pub(crate) struct Gathering {
     pub(crate) ranged: bool,
     /// Edge of the pattern of interleaved sampling.
     pub(crate) interleave: u32,
+    /// Whether lists are made even if they are not needed for the sum.
+    pub(crate) listed: bool,
 }
 
 /// The passes that sum virtual surface lights.
@@ -116,7 +118,7 @@ impl Gather {
             Accumulation::Tiled => self.encode_tiled(scope, targets, lights, gathering),
             Accumulation::Splat | Accumulation::Forward => {
                 // The lists are not used for the picture, but say what the range loses.
-                if gathering.ranged {
+                if gathering.listed {
                     self.encode_selections(scope, targets, lights);
                 }
                 self.encode_additive(scope, targets, geometry, lights, gathering, sees);
@@ -154,7 +156,7 @@ impl Gather {
     }
 
     fn prepare(&mut self, gpu: &Gpu, gathering: Gathering) -> Result<(), GpuError> {
-        let Gathering { accumulation, ranged, interleave } = gathering;
+        let Gathering { accumulation, ranged, interleave, .. } = gathering;
         if accumulation != Accumulation::Tiled
             && !gpu.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE)
         {

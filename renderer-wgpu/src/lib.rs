@@ -3,6 +3,7 @@
 
 pub mod cli;
 mod deferred;
+mod draw;
 mod error;
 mod frame;
 mod gather;
@@ -30,12 +31,13 @@ mod timer;
 mod view;
 mod vsl_buffer;
 
+pub use draw::Drawn;
 pub use error::GpuError;
 pub use gpu::{AdapterChoice, Gpu, UNIFORM_BLOCK_BYTES, instance_flags};
 #[cfg(all(feature = "import", unix))]
 pub use import::{ImportError, ImportedSegment};
 pub use picture::{Choices, WgpuRenderer};
-pub use renderer::{Drawn, Renderer};
+pub use renderer::Renderer;
 pub use timer::PassTime;
 pub use view::{Accumulation, Shadows, Show, View};
 pub use vsl_buffer::Upload;

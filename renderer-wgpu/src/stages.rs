@@ -17,6 +17,8 @@ pub(crate) struct Versions {
 /// A stage of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
+    /// Shadow maps, whatever the view.
+    Maps,
     GBuffer,
     Direct,
     Unpack,
@@ -27,7 +29,7 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    const COUNT: usize = 7;
+    const COUNT: usize = 8;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +88,8 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
     let shape = Versions { shape: versions.shape, ..Versions::default() };
     let View { kernel, epsilon, seed, .. } = *view;
     match stage {
+        // New views of lights are told apart by the lights' table.
+        Stage::Maps => Key { view: View { width: 0, height: 0, ..base }, versions: shape },
         Stage::GBuffer => Key { view: seen, versions: shape },
         Stage::Direct => {
             let View { shadows, light_samples, only_light, sample, .. } = *view;
@@ -99,13 +103,15 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
             Key { view: View { width: 0, height: 0, kernel, epsilon, ..base }, versions }
         }
         Stage::Indirect => {
-            let rays = view.visibility == Visibility::Rays;
+            let rays = view.by_rays();
             let view = View {
                 kernel,
                 epsilon,
                 accumulation: view.accumulation,
                 interleave: view.interleave,
                 visibility: if rays { Visibility::Rays } else { Visibility::None },
+                // Lists that the sum itself does not need are made for it alone.
+                show: if view.show == Show::Tiles { Show::Tiles } else { base.show },
                 rays_per_pixel: if rays { view.rays_per_pixel } else { 0 },
                 sample: if rays { view.sample } else { 0 },
                 seed: if rays { seed } else { 0 },
@@ -135,7 +141,7 @@ mod tests {
     #[test]
     fn a_stage_is_done_again_only_for_what_it_depends_on() {
         let (view, versions) = (view(), Versions::default());
-        let stages = [GBuffer, Direct, Unpack, Indirect, Openness, Owners, Output];
+        let stages = [Maps, GBuffer, Direct, Unpack, Indirect, Openness, Owners, Output];
         let mut done = Done::default();
         for stage in stages {
             assert!(done.is_stale(stage, &view, versions));
@@ -155,13 +161,13 @@ mod tests {
         assert_eq!(stale(View { shadows: Shadows::Rays, ..view }, versions), [Direct, Output]);
         assert_eq!(stale(View { kernel: Kernel::Paper, ..view }, versions), [Unpack, Indirect, Output]);
         assert_eq!(stale(View { interleave: 2, ..view }, versions), [Indirect, Output]);
-        assert_eq!(stale(View { show: Show::Tiles, ..view }, versions), [Owners, Output]);
+        assert_eq!(stale(View { show: Show::Tiles, ..view }, versions), [Indirect, Owners, Output]);
         assert_eq!(stale(view, Versions { vsls: 1, ..versions }), [Unpack, Indirect, Owners, Output]);
         assert_eq!(stale(view, Versions { lights: 1, ..versions }), [Direct, Output]);
         assert_eq!(stale(view, Versions { materials: 1, ..versions }), [Unpack, Indirect, Output]);
         assert_eq!(
             stale(view, Versions { shape: 1, ..versions }),
-            [GBuffer, Direct, Indirect, Openness, Owners, Output]
+            [Maps, GBuffer, Direct, Indirect, Openness, Owners, Output]
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{Gpu, GpuError};
 
-/// Time that one pass took on the device.
+/// Time that one pass took: by the device's clock, shadow rays by that of this process, their dispatches' ends included.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PassTime {
     /// What it did.

@@ -107,7 +107,7 @@ pub struct View {
     pub light_samples: u32,
     /// What is shown.
     pub show: Show,
-    /// Direct light of this light alone, by index; no indirect light then.
+    /// Direct light of this light alone, by index; the full picture then has no indirect light.
     pub only_light: Option<u32>,
     /// Place of the sample within its pixel; (0.5, 0.5) is the centre.
     pub jitter: [f32; 2],
@@ -161,6 +161,11 @@ impl View {
         Ok(())
     }
 
+    /// Whether indirect light is summed by shadow rays; lists of tiles are shown without.
+    pub(crate) fn by_rays(&self) -> bool {
+        self.visibility == Visibility::Rays && self.show != Show::Tiles
+    }
+
     pub(crate) fn needs_direct(&self) -> bool {
         match self.show {
             Show::Layer(kind) => kind.needs_direct(),
@@ -171,6 +176,7 @@ impl View {
 
     pub(crate) fn needs_indirect(&self) -> bool {
         match self.show {
+            Show::Layer(LayerKind::Indirect) => true,
             Show::Layer(kind) => kind.needs_indirect() && self.only_light.is_none(),
             Show::Tiles => true,
             Show::Discs | Show::Age => false,

@@ -5,7 +5,9 @@ use crate::{
     geometry::buffer,
     layout::{BATCH_LIGHTS, BatchNumbers, VslUniform},
     pipelines::{self, groups_of_64, whole},
-    readback, shader,
+    readback,
+    scope::Scope,
+    shader,
 };
 use photonstream_protocol::{VslFrame, VslRecord};
 use std::ops::Range;
@@ -158,10 +160,10 @@ impl VslBuffer {
     }
 
     /// Has the device put what was sent in its place.
-    pub(crate) fn flush(&mut self, encoder: &mut wgpu::CommandEncoder) {
+    pub(crate) fn flush(&self, encoder: &mut wgpu::CommandEncoder) {
         let Some(staging) = &self.staging else { return };
         let mut from = 0;
-        for run in self.pending.drain(..) {
+        for run in &self.pending {
             let bytes = run.len() as u64 * RECORD_BYTES;
             encoder.copy_buffer_to_buffer(
                 staging,
@@ -174,24 +176,26 @@ impl VslBuffer {
         }
     }
 
-    /// Whether anything waits for [`VslBuffer::flush`].
-    pub(crate) fn is_pending(&self) -> bool {
-        !self.pending.is_empty()
+    /// To be called once the commands of [`VslBuffer::flush`] are on their way: until then a picture that is given up
+    /// loses nothing.
+    pub(crate) fn delivered(&mut self) {
+        self.pending.clear();
     }
 
     fn flush_now(&mut self, gpu: &Gpu) {
-        if self.is_pending() {
+        if !self.pending.is_empty() {
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             self.flush(&mut encoder);
             gpu.queue.submit([encoder.finish()]);
+            self.delivered();
         }
     }
 
     /// Takes over `count` records that are on the device already.
     #[cfg(all(feature = "import", unix))]
     pub(crate) fn take(&mut self, gpu: &Gpu, records: &wgpu::Buffer, count: u32) -> Result<(), GpuError> {
-        self.pending.clear();
         self.reserve(gpu, count)?;
+        self.pending.clear();
         let bytes = u64::from(count) * size_of::<VslRecord>() as u64;
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         if bytes > 0 {
@@ -235,20 +239,14 @@ impl VslBuffer {
     }
 
     /// Unpacks the records for the kernel and range of the frame uniform.
-    pub(crate) fn encode(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, frame: &wgpu::Buffer) {
-        self.flush(encoder);
-        encoder.clear_buffer(&self.refused, 0, None);
+    pub(crate) fn encode(&self, scope: &mut Scope<'_>) {
+        self.flush(&mut scope.encoder);
+        scope.encoder.clear_buffer(&self.refused, 0, None);
         let layout = self.unpack.get_bind_group_layout(0);
-        let resources = [whole(frame), whole(&self.records), whole(&self.lights), whole(&self.refused)];
-        let group = pipelines::bind(gpu, &layout, &resources);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("unpack"),
-            timestamp_writes: None,
-        });
-        pass.set_pipeline(&self.unpack);
-        pass.set_bind_group(0, &group, &[]);
-        let (x, y) = groups_of_64(self.batches() * BATCH_LIGHTS);
-        pass.dispatch_workgroups(x, y, 1);
+        let resources = [whole(scope.frame), whole(&self.records), whole(&self.lights), whole(&self.refused)];
+        let group = pipelines::bind(scope.gpu, &layout, &resources);
+        let edge = scope.alone("unpacking");
+        scope.compute(edge, &self.unpack, &[&group], groups_of_64(self.batches() * BATCH_LIGHTS));
     }
 
     /// Number of records that were not shown because of values that no picture may show; waits for the device.

@@ -17,6 +17,10 @@ struct Corner {
 @vertex
 fn quad(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Corner {
     let light = batch.lights[index];
+    if dot(light.normal, light.normal) == 0.0 {
+        // A refused record: beyond the picture.
+        return Corner(vec4f(2.0, 2.0, 2.0, 1.0), vec2f(0.0), vec3f(0.0));
+    }
     let colour = colours[numbers.first + index];
     let at = vec2f(select(-1.0, 1.0, (vertex & 1u) != 0u), select(-1.0, 1.0, (vertex & 2u) != 0u));
     let helper = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(light.normal.x) > 0.7);

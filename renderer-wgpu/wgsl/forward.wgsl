@@ -7,7 +7,8 @@ struct Batch {
 @group(0) @binding(1) var<uniform> batch: Batch;
 
 struct Corner {
-    @builtin(position) clip: vec4f,
+    // The same bits as in gbuffer.wgsl: only what is seen passes the test for equal depth.
+    @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat, either) anchor: vec3f,
     @location(1) @interpolate(flat, either) normal: vec3f,
     @location(2) @interpolate(flat, either) light: u32,

@@ -1,7 +1,8 @@
 // Turns triangles into the G-buffer: what each pixel's ray meets first.
 
 struct Corner {
-    @builtin(position) clip: vec4f,
+    // The same bits as in forward.wgsl, which draws at equal depth.
+    @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat, either) anchor: vec3f,
     @location(1) @interpolate(flat, either) normal: vec3f,
     @location(2) @interpolate(flat, either) object: u32,

@@ -64,7 +64,8 @@ fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
                 let bit = firstTrailingBit(bits);
                 bits &= bits - 1u;
                 let light = batch.lights[i * 32u + bit];
-                let added = vsl_irradiance(light, surface.position, surface.normal);
+                // What overflows would be no number once its share is taken.
+                let added = min(vsl_irradiance(light, surface.position, surface.normal), vec3f(1e37));
                 let share_far = smoothstep(0.5 * steep, steep, distance(light.position, surface.position));
                 near += added * (1.0 - share_far);
                 far += added * select(0.0, share_far, ((place >> bit) & 1u) == 1u);

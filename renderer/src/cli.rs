@@ -30,7 +30,7 @@ pub struct Args {
     /// How light falls off: paper or disc; the scene's own if not given.
     #[arg(long, value_name = "K")]
     pub kernel: Option<Kernel>,
-    /// Shadows of indirect light: none or rays; the scene's own if not given.
+    /// Shadows of indirect light: none, rays, or ao with the GPU renderer; the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
     /// Layers to render: full, direct, indirect, albedo, normal, vsl, flux, depth.

@@ -115,9 +115,11 @@ impl Rays {
         encoder: &mut wgpu::CommandEncoder,
         pass: &Pass<'_>,
     ) -> Result<Traced, GpuError> {
-        let start = Instant::now();
         let fresh = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
+        // What came before has its own times.
+        gpu.wait()?;
+        let start = Instant::now();
         let mut traced = Traced::default();
         if let Some(workspace) = &self.workspace {
             let rows = workspace.band_rows;

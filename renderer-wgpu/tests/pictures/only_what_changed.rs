@@ -90,3 +90,58 @@ fn unseen_objects_are_not_drawn() {
     let behind = renderer.draw(&view).unwrap().objects_drawn;
     assert!(all == lit.scene.objects.len() as u32 && behind < all, "{behind} of {all}");
 }
+
+/// An object that moves while a picture without direct light is shown takes its shadow along; a camera that moves leaves
+/// the maps as they are.
+#[test]
+fn shadows_follow_what_moved_behind_another_layer() {
+    let lit = scenes::cornell(LAMPS[1].1, "vsls = 50\npool_paths = 1024");
+    let Some(mut renderer) = lit.renderer() else { return };
+    renderer.set_timed(true);
+    let view = View { show: Show::Layer(LayerKind::Direct), ..lit.view(64, 64) };
+    renderer.draw(&view).unwrap();
+    let before = renderer.pixels().unwrap();
+    let sphere = lit.scene.object("sphere").unwrap();
+    let mut place = lit.scene.objects[sphere.0 as usize].world_from_rest;
+    place.translation.x -= 0.3;
+    let moved = lit.scene.with_object_placed(sphere, place).unwrap();
+    renderer.set_scene(&moved).unwrap();
+    renderer.draw(&View { show: Show::Layer(LayerKind::Albedo), ..view }).unwrap();
+    renderer.draw(&view).unwrap();
+    let found = renderer.pixels().unwrap();
+    let Some(mut fresh) = scenes::Lit { scene: moved, frame: lit.frame.clone() }.renderer() else { return };
+    fresh.draw(&view).unwrap();
+    assert!(found == fresh.pixels().unwrap() && found != before);
+    let passes = renderer.draw(&View { jitter: [0.4, 0.5], ..view }).unwrap().passes;
+    let names: Vec<_> = passes.iter().map(|p| p.name).collect();
+    assert!(names.contains(&"direct light") && !names.contains(&"shadow maps"), "{names:?}");
+}
+
+/// Changed records are on the device even if the picture that should have taken them there was given up, and layers of one
+/// light show that light alone.
+#[test]
+fn a_picture_that_is_refused_loses_no_records() {
+    let lit = scenes::cornell(LAMPS[1].1, "vsls = 200\npool_paths = 4096");
+    let Some(mut renderer) = lit.renderer() else { return };
+    let view = lit.view(32, 32);
+    renderer.draw(&view).unwrap();
+    let mut changed = lit.frame.clone();
+    changed.frame = 2;
+    changed.vsls.iter_mut().for_each(|r| (r.changed_frame, r.flux) = (2, r.flux.map(|f| 2.0 * f)));
+    assert!(!renderer.set_frame(&changed).unwrap().complete);
+    let stop = std::sync::atomic::AtomicBool::new(true);
+    let watch = photonstream_renderer::Watch { progress: None, cancelled: Some(&stop) };
+    let rays = View { visibility: photonstream_scene::Visibility::Rays, ..view };
+    assert!(renderer.draw_watched(&rays, watch).unwrap().stopped);
+    renderer.draw(&view).unwrap();
+    let found = renderer.pixels().unwrap();
+    let Some(mut fresh) = scenes::Lit { scene: lit.scene.clone(), frame: changed }.renderer() else { return };
+    fresh.draw(&view).unwrap();
+    assert!(found == fresh.pixels().unwrap());
+    let alone = View { only_light: Some(0), show: Show::Layer(LayerKind::Indirect), ..view };
+    let moved = View { jitter: [0.1, 0.9], ..alone };
+    renderer.draw(&moved).unwrap();
+    let found = renderer.pixels().unwrap();
+    fresh.draw(&moved).unwrap();
+    assert!(found == fresh.pixels().unwrap());
+}
