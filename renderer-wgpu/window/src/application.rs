@@ -3,15 +3,15 @@
 use crate::{
     Args, WindowError,
     commands::{Commands, Told},
+    drawing::picture,
+    error::is_failure,
     following::Following,
     graphics::{Graphics, Shown},
     overlay::{self, Machine},
-    screenshot,
-    session::{Effort, Session},
+    session::Session,
 };
-use photonstream_film::Display;
 use photonstream_protocol::monotonic_ns;
-use photonstream_renderer_wgpu::{Drawn, GpuError};
+use photonstream_renderer_wgpu::GpuError;
 use std::{
     sync::{Arc, atomic::AtomicBool, mpsc},
     time::{Duration, Instant},
@@ -55,18 +55,13 @@ pub enum Ended {
 
 /// News from another thread.
 #[derive(Clone, Copy, Debug)]
-struct Wake;
+pub(crate) struct Wake;
 
-/// Whether there is a display to open a window on. Must be called from the main thread, and not by a process that calls
-/// [`run`]: a process may connect to its display once.
+/// Connects to the display; a process may do so once.
 ///
 /// # Errors
 /// [`WindowError::NoDisplay`].
-pub fn find_display() -> Result<(), WindowError> {
-    event_loop().map(drop)
-}
-
-fn event_loop() -> Result<EventLoop<Wake>, WindowError> {
+pub(crate) fn event_loop() -> Result<EventLoop<Wake>, WindowError> {
     let built = EventLoop::<Wake>::with_user_event().build();
     built.map_err(|error| WindowError::NoDisplay { reason: error.to_string() })
 }
@@ -285,6 +280,7 @@ impl Application {
             }
             Ok(Shown::Hidden) => {}
             Ok(Shown::Again) => window.request_redraw(),
+            Err(error) if !is_failure(&error) => return Err(error.into()),
             Err(error) => self.reopen(event_loop, window.clone(), error)?,
         }
         if is_moving || delay.is_zero() {
@@ -331,40 +327,4 @@ impl Application {
         let reason = "fault injection".into();
         self.reopen(event_loop, Arc::clone(window), GpuError::Lost { reason })
     }
-}
-
-/// Draws what changed; how it is to be displayed, if there is a picture. An option that this device lacks is told and
-/// put back.
-fn picture(
-    graphics: &mut Graphics,
-    session: &mut Session,
-    now: Instant,
-) -> Result<Option<Display>, GpuError> {
-    let Some((view, published)) = session.view().zip(session.published.clone()) else { return Ok(None) };
-    graphics.renderer.set_timed(session.shows_overlay || session.args.gpu.stats);
-    graphics.renderer.set_scene(&published.scene)?;
-    graphics.renderer.set_frame(&published.frame)?;
-    match graphics.renderer.draw(&view) {
-        Ok(Drawn { redrawn: true, passes, .. }) => {
-            session.effort = Effort { frame_ms: now.elapsed().as_secs_f64() * 1e3, passes };
-        }
-        Ok(_) => {}
-        Err(error @ (GpuError::Option { .. } | GpuError::Unsupported { .. } | GpuError::TooLarge { .. })) => {
-            session.notices.warn(error.to_string(), now);
-            session.put_back_choices();
-        }
-        Err(error) => return Err(error),
-    }
-    session.keep_choices();
-    if std::mem::take(&mut session.wants_screenshot)
-        && let Some(choices) = &session.choices
-    {
-        match screenshot::write(&mut graphics.renderer, &published, choices, &view, &session.args.out) {
-            Ok([exr, png]) => session.notices.say(format!("{}, {}", exr.display(), png.display()), now),
-            Err(error) => session.notices.warn(format!("no screenshot: {error}"), now),
-        }
-        // The file may have been drawn otherwise than the window shows it.
-        graphics.renderer.draw(&view)?;
-    }
-    Ok(session.choices.as_ref().map(|choices| choices.display()))
 }

@@ -7,6 +7,9 @@ use photonstream_renderer_wgpu::{Accumulation, Show, View};
 use photonstream_scene::{RenderSettings, Visibility};
 use photonstream_shading::{Camera, tone::ToneMap};
 
+/// Most stops of exposure up or down.
+pub(crate) const EXPOSURE_MOST: f32 = 20.0;
+
 /// What the user has chosen to see.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Choices {

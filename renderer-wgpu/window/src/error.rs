@@ -23,7 +23,8 @@ pub enum WindowError {
     },
     /// Nothing can be shown in this window.
     #[error(
-        "the window takes no pictures of {adapter} ({reason}); choose another with --adapter, or use --headless"
+        "the window takes no pictures of {adapter} ({reason}); choose another with --adapter, or write pictures with \
+         photonstream run --headless or --renderer cpu"
     )]
     Surface {
         /// Name of the adapter.
@@ -35,7 +36,10 @@ pub enum WindowError {
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// The device was lost again and again.
-    #[error("the graphics device was opened {times} times within {seconds} s and failed each time: {last}")]
+    #[error(
+        "the graphics device was opened {times} times within {seconds} s and failed each time: {last}; choose another \
+         --adapter, --software or a smaller --size, or write pictures with photonstream run --renderer cpu"
+    )]
     KeepsFailing {
         /// How often it was opened.
         times: usize,
@@ -55,4 +59,50 @@ pub enum WindowError {
         /// What the system said.
         reason: String,
     },
+}
+
+/// Whether a device that reports `error` is of no use any more; otherwise it only refuses what was asked of it.
+pub(crate) fn is_failure(error: &GpuError) -> bool {
+    !matches!(
+        error,
+        GpuError::Option { .. }
+            | GpuError::Unsupported { .. }
+            | GpuError::TooLarge { .. }
+            | GpuError::OutOfMemory { .. }
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_refused_leaves_the_device_alive() {
+        let text = String::new;
+        let too_large =
+            GpuError::TooLarge { what: "", found: 2, limit: 1, adapter: text(), remedy: "ask for less" };
+        for error in [
+            too_large,
+            GpuError::OutOfMemory { what: text(), reason: text() },
+            GpuError::Option { option: "", found: text(), expected: "" },
+        ] {
+            assert!(!is_failure(&error), "{error}");
+        }
+        for error in [
+            GpuError::Lost { reason: text() },
+            GpuError::Device { reason: text() },
+            GpuError::TimedOut { seconds: 1 },
+        ] {
+            assert!(is_failure(&error), "{error}");
+        }
+    }
+
+    #[test]
+    fn who_fails_for_good_names_a_way_out() {
+        let last = GpuError::Lost { reason: "test".into() };
+        let error = WindowError::KeepsFailing { times: 4, seconds: 20, last }.to_string();
+        for remedy in ["--adapter", "--software", "--size", "--renderer cpu"] {
+            assert!(error.contains(remedy), "{error}");
+        }
+    }
 }

@@ -16,6 +16,8 @@ pub(crate) struct Graphics {
     pub(crate) renderer: Renderer,
     /// What lies over it.
     pub(crate) interface: Interface,
+    /// Size of the picture that it has drawn last; `None` where it has none to show.
+    pub(crate) drawn: Option<(u32, u32)>,
 }
 
 /// What became of a picture.
@@ -25,7 +27,7 @@ pub(crate) enum Shown {
     Yes,
     /// Nobody could see it.
     Hidden,
-    /// The surface has to be set up anew first; try again.
+    /// The surface was not ready; try again.
     Again,
 }
 
@@ -40,22 +42,13 @@ impl Graphics {
         choice: &AdapterChoice,
         memory: Option<egui::Memory>,
     ) -> Result<Self, WindowError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle_from_env(Box::new(display));
-        descriptor.flags = instance_flags();
-        let instance = wgpu::Instance::new(descriptor);
-        let surface = instance.create_surface(Arc::clone(&window)).map_err(|error| WindowError::Surface {
-            adapter: "any adapter".into(),
-            reason: error.to_string(),
-        })?;
-        let gpu = Gpu::for_surface(instance, &surface, choice)?;
+        let (gpu, surface, configuration) = open_surface(display, &window, choice)?;
         for reason in &gpu.passed_over {
             tracing::info!("adapter passed over: {reason}");
         }
-        let size = window.inner_size();
-        let configuration = configuration(&gpu, &surface, size.width, size.height)?;
-        surface.configure(&gpu.device, &configuration);
         let interface = Interface::new(&window, &gpu, configuration.format, memory);
-        Ok(Self { window, surface, configuration, renderer: Renderer::new(gpu)?, interface })
+        let renderer = Renderer::new(gpu)?;
+        Ok(Self { window, surface, configuration, renderer, interface, drawn: None })
     }
 
     /// The size of the surface in pixels.
@@ -78,8 +71,8 @@ impl Graphics {
         true
     }
 
-    /// Shows the last picture that the renderer has drawn, as `display` says, and the interface over it; without a
-    /// picture the interface alone.
+    /// Shows the last picture that the renderer has drawn, as `display` says, and the interface over it; where either
+    /// is missing, the interface alone.
     ///
     /// # Errors
     /// [`GpuError`] of a device that has failed.
@@ -87,9 +80,9 @@ impl Graphics {
         let target = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(target)
             | wgpu::CurrentSurfaceTexture::Suboptimal(target) => target,
-            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
-                return Ok(Shown::Hidden);
-            }
+            wgpu::CurrentSurfaceTexture::Occluded => return Ok(Shown::Hidden),
+            // Of light that has converged there is no next picture.
+            wgpu::CurrentSurfaceTexture::Timeout => return Ok(Shown::Again),
             wgpu::CurrentSurfaceTexture::Outdated => {
                 self.surface.configure(&self.renderer.gpu().device, &self.configuration);
                 self.renderer.gpu().check()?;
@@ -108,7 +101,7 @@ impl Graphics {
         let size = (target.texture.width(), target.texture.height());
         let (device, queue) = (self.renderer.gpu().device.clone(), self.renderer.gpu().queue.clone());
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        match display {
+        match display.filter(|_| self.drawn.is_some()) {
             Some(display) => self.renderer.show(&mut encoder, &view, self.configuration.format, display),
             None => clear(&mut encoder, &view),
         }
@@ -132,6 +125,28 @@ impl Graphics {
         tracing::info!("the window's surface was lost and made anew");
         Ok(Shown::Again)
     }
+}
+
+/// A device that can show pictures in `window`, and the window's surface set up for it.
+///
+/// # Errors
+/// [`WindowError::Surface`], [`WindowError::Gpu`].
+pub(crate) fn open_surface(
+    display: OwnedDisplayHandle,
+    window: &Arc<Window>,
+    choice: &AdapterChoice,
+) -> Result<(Gpu, wgpu::Surface<'static>, wgpu::SurfaceConfiguration), WindowError> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle_from_env(Box::new(display));
+    descriptor.flags = instance_flags();
+    let instance = wgpu::Instance::new(descriptor);
+    let surface = instance
+        .create_surface(Arc::clone(window))
+        .map_err(|error| WindowError::Surface { adapter: "any adapter".into(), reason: error.to_string() })?;
+    let gpu = Gpu::for_surface(instance, &surface, choice)?;
+    let size = window.inner_size();
+    let configuration = configuration(&gpu, &surface, size.width, size.height)?;
+    surface.configure(&gpu.device, &configuration);
+    Ok((gpu, surface, configuration))
 }
 
 fn clear(encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView) {

@@ -1,6 +1,10 @@
 //! Turns keys into what the window does, and held keys into motion of the camera.
 
-use crate::{choices::SHOWS, navigation::Navigation, session::Session};
+use crate::{
+    choices::{EXPOSURE_MOST, SHOWS},
+    navigation::Navigation,
+    session::Session,
+};
 use glam::Vec3;
 use photonstream_protocol::Request;
 use winit::keyboard::KeyCode;
@@ -99,7 +103,8 @@ fn moves(key: KeyCode) -> bool {
 impl Session {
     /// A key went down (`is_repeat` while it stays there) or up.
     pub(crate) fn key(&mut self, key: KeyCode, is_down: bool, is_repeat: bool) {
-        if moves(key) && !self.pointer.control {
+        // With Ctrl a key is a command, but one that was held before still comes up.
+        if moves(key) && (!is_down || !self.pointer.control) {
             self.motion.set(key, is_down);
             return;
         }
@@ -112,7 +117,7 @@ impl Session {
             _ => 0.0,
         };
         if let Some(choices) = &mut self.choices {
-            choices.exposure_ev = (choices.exposure_ev + step).clamp(-20.0, 20.0);
+            choices.exposure_ev = (choices.exposure_ev + step).clamp(-EXPOSURE_MOST, EXPOSURE_MOST);
         }
         if is_repeat {
             return;
@@ -177,6 +182,26 @@ mod tests {
         assert!(navigation.camera().forward.x > 0.0);
         motion.stop();
         assert!(!motion.advance(&mut navigation, 1.0));
+    }
+
+    #[test]
+    fn a_key_that_comes_up_with_ctrl_down_ends_the_flight() {
+        #[derive(clap::Parser)]
+        struct Command {
+            #[command(flatten)]
+            args: crate::Args,
+        }
+        let args = <Command as clap::Parser>::try_parse_from(["w"]).unwrap().args;
+        let home = Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 40.0).unwrap();
+        let mut navigation = Navigation::new(home, 1.0, 1.0);
+        let mut session = Session::new(args);
+        session.key(KeyCode::KeyW, true, false);
+        session.pointer.control = true;
+        assert!(session.motion.advance(&mut navigation, 0.1));
+        session.key(KeyCode::KeyW, false, false);
+        assert!(!session.motion.advance(&mut navigation, 0.1));
+        session.key(KeyCode::KeyW, true, false);
+        assert!(!session.motion.advance(&mut navigation, 0.1), "with Ctrl it is no flight");
     }
 
     #[test]

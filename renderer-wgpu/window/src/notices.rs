@@ -33,10 +33,12 @@ impl Notices {
     }
 
     fn add(&mut self, text: String, is_error: bool, now: Instant) {
-        if is_error {
-            tracing::warn!("{text}");
-        } else {
-            tracing::info!("{text}");
+        // Once for as long as it stays.
+        let is_shown = self.0.iter().any(|notice| notice.text == text && notice.until > now);
+        match is_error {
+            _ if is_shown => {}
+            true => tracing::warn!("{text}"),
+            false => tracing::info!("{text}"),
         }
         self.0.retain(|notice| notice.text != text);
         self.0.push(Notice { text, is_error, until: now + SHOWN });

@@ -4,6 +4,7 @@ use crate::{
     Args,
     choices::Choices,
     commands::Told,
+    flaws::Flaws,
     following::{Connection, News, Published},
     keys::Motion,
     latency::Latency,
@@ -56,6 +57,9 @@ pub(crate) struct Session {
     pub(crate) notices: Notices,
     pub(crate) latency: Latency,
     pub(crate) effort: Effort,
+    pub(crate) flaws: Flaws,
+    /// Whether the picture is of an earlier frame, since the device refused the published one.
+    pub(crate) is_behind: bool,
     pub(crate) motion: Motion,
     pub(crate) pointer: Pointer,
     pub(crate) wants_screenshot: bool,
@@ -91,6 +95,8 @@ impl Session {
             notices: Notices::default(),
             latency: Latency::default(),
             effort: Effort::default(),
+            flaws: Flaws::default(),
+            is_behind: false,
             motion: Motion::default(),
             pointer: Pointer::default(),
             wants_screenshot: false,
@@ -173,7 +179,7 @@ impl Session {
 
     /// Counts the frame that has just been shown at `now_ns`; whether these are as many as were asked for.
     pub(crate) fn count_shown(&mut self, now_ns: u64) -> bool {
-        if let Some(published) = &self.published {
+        if let Some(published) = self.published.as_ref().filter(|_| !self.is_behind) {
             let frame = &published.frame;
             let this = Some((frame.epoch, frame.frame));
             if std::mem::replace(&mut self.last_shown, this) != this {
@@ -211,13 +217,15 @@ impl Session {
         }
     }
 
-    /// What is chosen now cannot be drawn.
-    pub(crate) fn put_back_choices(&mut self) {
+    /// What is chosen now cannot be drawn; whether there is something else to try.
+    pub(crate) fn put_back_choices(&mut self) -> bool {
+        let refused = self.choices.clone();
         if self.good_choices.is_some() {
             self.choices.clone_from(&self.good_choices);
         } else if let (Some(choices), Some(published)) = (&mut self.choices, &self.published) {
             choices.view = View::from_settings(&published.scene.render, &published.scene.camera);
         }
+        self.choices != refused
     }
 
     pub(crate) fn is_paused(&self) -> bool {

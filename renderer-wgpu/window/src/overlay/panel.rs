@@ -2,10 +2,10 @@
 
 use super::window;
 use crate::{
-    choices::{Choices, SHOWS, show_name},
+    choices::{Choices, EXPOSURE_MOST, SHOWS, show_name},
     session::Session,
 };
-use egui::{ComboBox, Context, Grid, Slider, Ui, pos2};
+use egui::{ComboBox, Context, Grid, Slider, SliderClamping, Ui, pos2};
 use photonstream_protocol::Request;
 use photonstream_renderer_wgpu::{Accumulation, Shadows};
 use photonstream_scene::{Scene, Visibility};
@@ -48,7 +48,11 @@ fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
         combo(ui, "show", &mut view.show, names, now);
     });
     row(ui, "exposure", |ui| {
-        ui.add(Slider::new(&mut choices.exposure_ev, -8.0..=8.0).suffix(" EV").step_by(0.05));
+        let slider = slider(&mut choices.exposure_ev, -8.0..=8.0).max_decimals(2).suffix(" EV");
+        if ui.add(slider).changed() {
+            let typed = Some(choices.exposure_ev).filter(|ev| ev.is_finite()).unwrap_or_default();
+            choices.exposure_ev = typed.clamp(-EXPOSURE_MOST, EXPOSURE_MOST);
+        }
     });
     row(ui, "tone map", |ui| named(ui, "tone map", &mut choices.tone_map, &ToneMap::ALL, ToneMap::name));
     row(ui, "kernel", |ui| named(ui, "kernel", &mut view.kernel, &Kernel::ALL, Kernel::name));
@@ -61,7 +65,7 @@ fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
                 n if n < 1.0 => "one to each".to_owned(),
                 n => format!("{n}"),
             };
-            ui.add(Slider::new(&mut view.rays_per_pixel, 0..=256).custom_formatter(text));
+            ui.add(slider(&mut view.rays_per_pixel, 0..=256).custom_formatter(text));
         });
     }
     row(ui, "accumulation", |ui| {
@@ -77,12 +81,12 @@ fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
         });
     }
     row(ui, "light range ε", |ui| {
-        let slider = Slider::new(&mut view.epsilon, 0.0..=1.0).logarithmic(true).smallest_positive(1e-8);
+        let slider = slider(&mut view.epsilon, 0.0..=1.0).logarithmic(true).smallest_positive(1e-8);
         ui.add(slider.custom_formatter(|e, _| if e > 0.0 { format!("{e:.1e}") } else { "unlimited".into() }));
     });
     row(ui, "shadows", |ui| named(ui, "shadows", &mut view.shadows, Shadows::ALL, Shadows::name));
     row(ui, "light samples", |ui| {
-        ui.add(Slider::new(&mut view.light_samples, 1..=64).logarithmic(true));
+        ui.add(slider(&mut view.light_samples, 1..=64).logarithmic(true));
     });
     row(ui, "only light", |ui| {
         let named = (0u32..).zip(&scene.lights).map(|(id, light)| (Some(id), light.name.clone()));
@@ -91,6 +95,11 @@ fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
             names.iter().find(|(id, _)| *id == view.only_light).map_or("all".into(), |(_, n)| n.clone());
         combo(ui, "only light", &mut view.only_light, names, now);
     });
+}
+
+/// A slider for what is usual; a value beyond it stays, and can be typed. What the renderer refuses is put back.
+fn slider<N: egui::emath::Numeric>(value: &mut N, usual: std::ops::RangeInclusive<N>) -> Slider<'_> {
+    Slider::new(value, usual).clamping(SliderClamping::Never)
 }
 
 fn row(ui: &mut Ui, label: &str, add: impl FnOnce(&mut Ui)) {
@@ -110,4 +119,51 @@ fn combo<T: PartialEq>(ui: &mut Ui, id: &str, value: &mut T, names: Vec<(T, Stri
 fn named<T: PartialEq + Copy>(ui: &mut Ui, id: &str, value: &mut T, all: &[T], name: fn(T) -> &'static str) {
     let now = name(*value).to_owned();
     combo(ui, id, value, all.iter().map(|&v| (v, name(v).to_owned())).collect(), now);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use glam::Vec3;
+    use photonstream_scene::{RenderSettings, SceneConfig};
+    use photonstream_shading::Camera;
+    use std::path::Path;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: crate::Args,
+    }
+
+    #[test]
+    fn values_beyond_the_sliders_are_left_as_they_are() {
+        let text = "
+            [camera]
+            position_m = [0, 0, 4]
+            target_m = [0, 0, 0]
+            vertical_fov_deg = 40
+            [material.white]
+            albedo = 0.5
+            [object.box]
+            material = \"white\"
+            box = { size_m = [1, 1, 1] }
+            [light.lamp]
+            power_w = 10
+            point = { position_m = [0, 2, 0] }
+        ";
+        let scene = SceneConfig::from_text(text, Path::new("s.toml")).unwrap().build().unwrap();
+        let args = Command::try_parse_from(["w", "--visibility", "rays", "--rays", "1000"]).unwrap().args;
+        let camera = Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 40.0).unwrap();
+        let mut choices = Choices::new(&RenderSettings::default(), &camera, &args);
+        choices.exposure_ev = -12.34;
+        choices.view.epsilon = 5.0;
+        choices.view.light_samples = 1000;
+        let before = choices.clone();
+        assert_eq!(before.view.rays_per_pixel, 1000);
+        egui::__run_test_ui(|ui| {
+            Grid::new("view").show(ui, |ui| switches(ui, &mut choices, &scene));
+        });
+        assert_eq!(choices, before);
+    }
 }

@@ -7,7 +7,7 @@ use crate::{
     session::{Selected, Session},
     standing::Standing,
 };
-use egui::{Align2, Context, DragValue, Slider, Ui, pos2};
+use egui::{Align2, Context, DragValue, Slider, SliderClamping, Ui, pos2};
 use glam::{DVec3, Vec3};
 use photonstream_protocol::Request;
 use photonstream_scene::{LightId, ObjectId};
@@ -100,8 +100,7 @@ fn light(ui: &mut Ui, name: &str, published: &Published, draft: &mut Draft, requ
         requests.push(switch_light(name, draft.enabled));
     }
     let unit = if is_parallel { " W/m²" } else { " W" };
-    let slider = Slider::new(&mut draft.power, 0.0..=1000.0).logarithmic(true).smallest_positive(0.01);
-    let power = ui.add(slider.suffix(unit)).changed();
+    let power = power(ui, &mut draft.power, unit);
     let colour = ui.horizontal(|ui| {
         ui.label("colour");
         ui.color_edit_button_rgb(&mut draft.colour).changed()
@@ -119,6 +118,17 @@ fn light(ui: &mut Ui, name: &str, published: &Published, draft: &mut Draft, requ
             }
         }
     }
+}
+
+/// A slider for what lamps have; what is beyond it stays, and can be typed. Whether it was changed.
+fn power(ui: &mut Ui, power: &mut f32, unit: &str) -> bool {
+    let slider = Slider::new(power, 0.0..=1000.0).logarithmic(true).smallest_positive(0.01);
+    let changed = ui.add(slider.clamping(SliderClamping::Never).suffix(unit)).changed();
+    if changed {
+        // A number that was typed.
+        *power = if power.is_finite() { power.max(0.0) } else { 0.0 };
+    }
+    changed
 }
 
 fn object(ui: &mut Ui, name: &str, published: &Published, draft: &mut Draft, requests: &mut Vec<Request>) {
@@ -150,4 +160,18 @@ fn position(ui: &mut Ui, position_m: &mut DVec3) -> bool {
         changed
     });
     changed.inner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strong_lamps_are_left_as_they_are() {
+        egui::__run_test_ui(|ui| {
+            let mut value = 5000.0;
+            assert!(!power(ui, &mut value, " W"), "nobody touched it");
+            assert_eq!(value, 5000.0);
+        });
+    }
 }

@@ -1,7 +1,10 @@
 //! Turns a frame's counters and what its picture took into lines of text.
 
 use super::{Machine, alarm, right, window};
-use crate::session::{Effort, Session};
+use crate::{
+    flaws::approximation,
+    session::{Effort, Session},
+};
 use egui::{Context, Grid, RichText, Ui, pos2};
 
 pub(super) fn show(ctx: &Context, session: &Session, machine: &Machine) {
@@ -17,6 +20,12 @@ pub(super) fn show(ctx: &Context, session: &Session, machine: &Machine) {
                 ui.end_row();
             }
         });
+        if let Some(words) = session.view().as_ref().and_then(approximation) {
+            ui.label(RichText::new(words).small());
+        }
+        for warning in session.flaws.warnings() {
+            alarm(ui, warning);
+        }
         passes(ui, &session.effort);
     });
 }
@@ -42,6 +51,9 @@ fn lines(session: &Session) -> Vec<(&'static str, String)> {
             ("light", state),
             ("published frame", frame.frame.to_string()),
         ]);
+    }
+    if let Some(noise) = session.flaws.noise() {
+        lines.push(("noise of rays", format!("{:.2} %", 100.0 * noise)));
     }
     if session.latency.is_known() {
         lines.push(("change to published", format!("{:.1} ms", session.latency.published_ms)));
