@@ -2,12 +2,9 @@
 
 use crate::surface::Surface;
 use glam::Vec3;
+use photonstream_renderer::shadow_rays::SHADOW_REACH;
 use photonstream_scene::{Scene, bvh::Ray};
 use photonstream_shading::{Light, light::Illumination, sobol::Sample};
-
-/// Share of the way to a light at which its shadow ray ends: the rounding of direction and distance (a few 2⁻²⁴)
-/// must not carry it through the emitter.
-const SHADOW_REACH: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Irradiance in W m⁻² from `light` at `surface`, through the point of the light that `u` chooses; the number of rays
 /// traced is added to `rays`.

@@ -16,6 +16,7 @@ use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
     FrameRenderer, LayerKind, RenderError, RenderOptions, RenderStats, Rendered, VslSet, Watch, owner,
+    shadow_rays::LIGHT_SEED,
 };
 use photonstream_scene::{Scene, Visibility};
 use photonstream_shading::sobol::Sequence;
@@ -257,6 +258,3 @@ impl<'a> Frame<'a> {
         }
     }
 }
-
-/// Scrambles area-light samples apart from pixel samples.
-const LIGHT_SEED: u64 = 0x6C69_6768_7473_0000;

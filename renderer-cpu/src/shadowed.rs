@@ -5,11 +5,9 @@ use crate::{
     tile::Tile,
 };
 use glam::Vec3;
+use photonstream_renderer::shadow_rays::SHADOW_REACH;
 use photonstream_scene::{Scene, bvh::Ray};
 use photonstream_shading::{Kernel, surface::RELATIVE_OFFSET};
-
-/// Share of the way to a virtual surface light at which its shadow ray ends.
-const SHADOW_REACH: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// What shadow rays have done.
 #[derive(Clone, Copy, Debug, Default)]

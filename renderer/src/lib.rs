@@ -13,6 +13,7 @@ pub mod owner;
 pub mod program;
 pub mod published;
 mod rendered;
+pub mod shadow_rays;
 mod vsl;
 mod watch;
 

@@ -33,8 +33,14 @@ use bindings::{Layouts, bind, pipeline, upload};
 use dispatch::{Pass, Workspace};
 use glam::Vec3;
 use noise::Noise;
-use photonstream_renderer::Watch;
-use photonstream_scene::Geometry;
+use photonstream_renderer::{
+    Watch,
+    shadow_rays::{LIGHT_SEED, SHADOW_REACH},
+};
+use photonstream_scene::{
+    Geometry,
+    bvh::{NODE_PAD_ORIGIN, SMALLEST_COMPONENT, TRIANGLE_PAD},
+};
 use std::sync::Arc;
 use tree::Tree;
 
@@ -44,21 +50,11 @@ pub(crate) const RAY_STACK: u32 = tree::STACK;
 pub(crate) const RAY_TURNS: u32 = 3_800;
 /// Turns of loops after which a pixel starts no further ray, so that few have to be suspended.
 const RAY_TURNS_FOR_NEW: u32 = 2_400;
-/// Share of the way to a light at which its shadow ray ends; twin of the CPU renderer's.
-const SHADOW_REACH: f32 = 1.0 - 8.0 * f32::EPSILON;
 /// Unit round-off of `f32`.
 const ROUND_OFF: f32 = f32::EPSILON * 0.5;
-/// Padding of a triangle's own box, in multiples of its corners' largest distance; twin of the scene's structure.
-const TRIANGLE_PAD: f32 = 16.0 * ROUND_OFF;
 /// Padding of node boxes, in multiples of the distance of the scene's farthest corner: twice that of the scene's own
 /// structure, for a box here is also rounded when it is compressed, and taken apart by one more product and sum.
 const NODE_PAD_DISTANCE: f32 = 48.0 * ROUND_OFF;
-/// Padding of node boxes, in multiples of the origin's largest coordinate; twin of the scene's structure.
-const NODE_PAD_ORIGIN: f32 = 4.0 * ROUND_OFF;
-/// Smallest component of a direction in box tests, in multiples of its largest; twin of the scene's structure.
-const SMALLEST_COMPONENT: f32 = 1.0 / photonstream_scene::bvh::MAX_COORDINATE;
-/// Scrambles area-light samples apart from pixel samples; twin of the CPU renderer's.
-const LIGHT_SEED: u64 = 0x6C69_6768_7473_0000;
 /// Scrambles the choice of virtual surface lights apart from all others.
 const VSL_SEED: u32 = 0x7673_6C73;
 

@@ -62,7 +62,7 @@ use glam::Vec3;
 
 pub use error::BvhError;
 pub use part::Bvh;
-pub use ray_frame::MAX_COORDINATE;
+pub use ray_frame::{MAX_COORDINATE, NODE_PAD_ORIGIN, SMALLEST_COMPONENT, TRIANGLE_PAD};
 pub use scene_bvh::SceneBvh;
 
 /// A ray or a segment in world space, in metres.

@@ -14,17 +14,17 @@ const ROUND_OFF: f32 = f32::EPSILON * 0.5;
 ///
 /// The sheared vertices are off by ≤ 6.01 round-offs of that distance, so the exact ray meets a triangle whose
 /// vertices moved by no more; subtracting the origin, the reciprocal and the product add ≤ 4; 16 leaves a reserve.
-pub(super) const TRIANGLE_PAD: f32 = 16.0 * ROUND_OFF;
+pub const TRIANGLE_PAD: f32 = 16.0 * ROUND_OFF;
 
 /// Padding of node boxes as a multiple of the distance from the origin to the farthest corner of the scene:
 /// a triangle's own padding, 4 round-offs between exact and computed own box, and 2 of the node test itself.
 const NODE_PAD_DISTANCE: f32 = 24.0 * ROUND_OFF;
 /// Padding of node boxes as a multiple of the origin's largest coordinate: rounding `origin` and `origin · inverse`.
-const NODE_PAD_ORIGIN: f32 = 4.0 * ROUND_OFF;
+pub const NODE_PAD_ORIGIN: f32 = 4.0 * ROUND_OFF;
 
 /// Components of the direction below this part of the largest are taken for that size in box tests, so that
 /// reciprocals stay finite: within the scene such a ray moves sideways by < 2⁻³⁹ of its length, far below the padding.
-const SMALLEST_COMPONENT: f32 = 1.0 / MAX_COORDINATE;
+pub const SMALLEST_COMPONENT: f32 = 1.0 / MAX_COORDINATE;
 
 /// A ray whose direction is scaled by a power of two (exactly) to a largest component in [1, 2).
 #[derive(Clone, Copy, Debug)]
