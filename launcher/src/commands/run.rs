@@ -169,7 +169,9 @@ fn names(args: &Args) -> Result<Vec<String>, LauncherError> {
     match window::find(&args.gpu) {
         Ok(()) => Ok(vec![WINDOW.to_owned()]),
         Err(reason) => {
-            backend::check(["cpu"], &args.gpu)?;
+            backend::check(["cpu"], &args.gpu).map_err(|error| {
+                LauncherError::Usage(format!("{error}, and there can be no window: {reason}"))
+            })?;
             let out = args.out.display();
             tracing::info!("rendering on the CPU, without a window: {reason}; pictures go to {out}");
             Ok(vec!["cpu".to_owned()])

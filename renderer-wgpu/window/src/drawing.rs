@@ -28,7 +28,8 @@ pub(crate) fn picture(
         if is_failure(&error) || session.args.frames.is_some() {
             return Err(error);
         }
-        session.notices.warn(format!("{error}; this is the last picture"), now);
+        let shown = if graphics.drawn.is_some() { "; this is the last picture" } else { "" };
+        session.notices.warn(format!("{error}{shown}"), now);
         session.is_behind = true;
         return Ok(session.choices.as_ref().map(|choices| choices.display()));
     }
