@@ -9,9 +9,10 @@ pub(crate) fn start(global: &Global) {
     // Targets match by their beginning: `photonstream` stands for all crates of the workspace.
     let default = match i16::from(global.verbose) - i16::from(global.quiet) {
         ..=-2 => "error",
-        -1 => "warn",
-        0 => "warn,photonstream=info",
-        1 => "info,photonstream=debug",
+        -1 => "warn,winit=error",
+        // winit complains of displays without a size, which is no business of the user's.
+        0 => "warn,photonstream=info,winit=error",
+        1 => "info,photonstream=debug,winit=error",
         _ => "debug,photonstream=trace",
     };
     let filter = match std::env::var("RUST_LOG") {

@@ -22,7 +22,8 @@ fn main() {
     let only = std::env::args().skip(1).find(|a| !a.starts_with('-')).unwrap_or_default();
     let gpu = Gpu::headless(&AdapterChoice::default()).unwrap();
     println!("Device: {}\n", gpu.name());
-    let parts: [(&str, fn(&Gpu)); 4] =
+    type Part = (&'static str, fn(&Gpu));
+    let parts: [Part; 4] =
         [("uploads", uploads), ("passes", passes), ("many", many_lights), ("accumulations", accumulations)];
     for (_, part) in parts.iter().filter(|(name, _)| name.contains(&only)) {
         part(&gpu);

@@ -43,8 +43,10 @@ fn alarm(ui: &mut Ui, text: impl Into<String>) {
 }
 
 /// A window of the overlay that stays where the user puts it.
-fn window<'a>(title: &'a str, place: egui::Pos2) -> egui::Window<'a> {
-    egui::Window::new(title).default_pos(place).resizable(false)
+fn window<'a>(ctx: &Context, title: &'a str, place: egui::Pos2) -> egui::Window<'a> {
+    // On small pictures folded at first: they would hide what there is to see.
+    let has_room = ctx.content_rect().width() > 900.0;
+    egui::Window::new(title).default_pos(place).default_open(has_room).resizable(false)
 }
 
 /// The right edge of the picture, in points.

@@ -12,7 +12,7 @@ use photonstream_scene::{Scene, Visibility};
 use photonstream_shading::{Kernel, tone::ToneMap};
 
 pub(super) fn show(ctx: &Context, session: &mut Session) {
-    window("View", pos2(8.0, 8.0)).show(ctx, |ui| {
+    window(ctx, "View", pos2(8.0, 8.0)).show(ctx, |ui| {
         ui.horizontal(|ui| {
             let is_paused = session.is_paused();
             if ui.button(if is_paused { "Resume" } else { "Pause" }).clicked() {

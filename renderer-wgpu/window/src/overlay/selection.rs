@@ -44,7 +44,11 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
     };
     let place = pos2(8.0, ctx.content_rect().bottom() - 8.0);
     let mut requests = Vec::new();
-    let frame = window("selection", place).pivot(Align2::LEFT_BOTTOM).title_bar(false).default_width(234.0);
+    let frame = window(ctx, "selection", place)
+        .pivot(Align2::LEFT_BOTTOM)
+        .title_bar(false)
+        .default_open(true)
+        .default_width(234.0);
     frame.show(ctx, |ui| {
         ui.strong(title);
         match &selected {

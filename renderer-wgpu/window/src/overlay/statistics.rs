@@ -8,7 +8,7 @@ use crate::{
 use egui::{Context, Grid, RichText, Ui, pos2};
 
 pub(super) fn show(ctx: &Context, session: &Session, machine: &Machine) {
-    window("Figures", pos2(right(ctx) - 250.0, 8.0)).default_width(234.0).show(ctx, |ui| {
+    window(ctx, "Figures", pos2(right(ctx) - 250.0, 8.0)).default_width(234.0).show(ctx, |ui| {
         ui.label(RichText::new(&machine.adapter).small());
         if machine.is_software {
             alarm(ui, "software rendering: slow");
