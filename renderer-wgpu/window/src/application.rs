@@ -1,7 +1,7 @@
 //! Turns the events of a window into a running session: draws when something changed, and waits otherwise.
 
 use crate::{
-    Args, WindowError,
+    Args, Fault, FaultKind, WindowError,
     commands::{Commands, Told},
     drawing::picture,
     error::is_failure,
@@ -313,18 +313,32 @@ impl Application {
         Ok(())
     }
 
-    /// Destroys the device once, where the arguments ask for it.
+    /// Lets happen once what the arguments ask for.
     fn inject_fault(
         &mut self,
         event_loop: &ActiveEventLoop,
         window: &Arc<Window>,
     ) -> Result<(), WindowError> {
-        let is_due = self.session.args.lose_device_after.is_some_and(|n| self.report.presented >= n);
-        let Some(graphics) = self.graphics.as_ref().filter(|_| is_due) else { return Ok(()) };
-        self.session.args.lose_device_after = None;
-        graphics.renderer.gpu().device.destroy();
-        // Its owner has destroyed it: the driver does not report that as a loss.
-        let reason = "fault injection".into();
-        self.reopen(event_loop, Arc::clone(window), GpuError::Lost { reason })
+        let is_due = |fault: &mut Fault| self.report.presented >= fault.after;
+        let Some(fault) = self.session.args.fault.take_if(is_due) else { return Ok(()) };
+        tracing::warn!("fault injection: {:?}", fault.kind);
+        let Some(graphics) = &mut self.graphics else { return Ok(()) };
+        match fault.kind {
+            FaultKind::Device => {
+                graphics.renderer.gpu().device.destroy();
+                // Its owner has destroyed it: the driver does not report that as a loss.
+                let reason = "fault injection".into();
+                return self.reopen(event_loop, Arc::clone(window), GpuError::Lost { reason });
+            }
+            FaultKind::Surface => graphics.fault = Some(wgpu::CurrentSurfaceTexture::Lost),
+            FaultKind::Outdated => graphics.fault = Some(wgpu::CurrentSurfaceTexture::Outdated),
+            FaultKind::Timeout => graphics.fault = Some(wgpu::CurrentSurfaceTexture::Timeout),
+            FaultKind::Suspend => {
+                self.suspended(event_loop);
+                self.resumed(event_loop);
+            }
+        }
+        window.request_redraw();
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! Turns command-line arguments into what the window shows first; shared by its own program and the launcher.
 
+use crate::Fault;
 use photonstream_protocol::ChannelName;
 use photonstream_renderer::{LayerKind, cli::Size};
 use photonstream_renderer_wgpu::cli::GpuArgs;
@@ -34,9 +35,9 @@ pub struct Args {
     /// What only the GPU renderer has; accumulation, interleave, shadows and rays at first.
     #[command(flatten)]
     pub gpu: GpuArgs,
-    /// Fault injection: the graphics device is destroyed once, after so many pictures.
-    #[arg(long, value_name = "N", hide = true)]
-    pub lose_device_after: Option<u64>,
+    /// Fault injection: once, after so many pictures.
+    #[arg(long, value_name = "KIND@PICTURES", hide = true)]
+    pub fault: Option<Fault>,
 }
 
 #[cfg(test)]

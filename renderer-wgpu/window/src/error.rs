@@ -61,6 +61,13 @@ pub enum WindowError {
     },
 }
 
+impl WindowError {
+    /// Whether the graphics device is to blame, and something else could make the picture.
+    pub fn is_of_device(&self) -> bool {
+        matches!(self, Self::Surface { .. } | Self::Gpu(_) | Self::KeepsFailing { .. })
+    }
+}
+
 /// Whether a device that reports `error` is of no use any more; otherwise it only refuses what was asked of it.
 pub(crate) fn is_failure(error: &GpuError) -> bool {
     !matches!(

@@ -18,6 +18,8 @@ pub(crate) struct Graphics {
     pub(crate) interface: Interface,
     /// Size of the picture that it has drawn last; `None` where it has none to show.
     pub(crate) drawn: Option<(u32, u32)>,
+    /// What the surface says next instead of the truth.
+    pub(crate) fault: Option<wgpu::CurrentSurfaceTexture>,
 }
 
 /// What became of a picture.
@@ -48,7 +50,7 @@ impl Graphics {
         }
         let interface = Interface::new(&window, &gpu, configuration.format, memory);
         let renderer = Renderer::new(gpu)?;
-        Ok(Self { window, surface, configuration, renderer, interface, drawn: None })
+        Ok(Self { window, surface, configuration, renderer, interface, drawn: None, fault: None })
     }
 
     /// The size of the surface in pixels.
@@ -77,7 +79,7 @@ impl Graphics {
     /// # Errors
     /// [`GpuError`] of a device that has failed.
     pub(crate) fn present(&mut self, display: Option<Display>) -> Result<Shown, GpuError> {
-        let target = match self.surface.get_current_texture() {
+        let target = match self.fault.take().unwrap_or_else(|| self.surface.get_current_texture()) {
             wgpu::CurrentSurfaceTexture::Success(target)
             | wgpu::CurrentSurfaceTexture::Suboptimal(target) => target,
             wgpu::CurrentSurfaceTexture::Occluded => return Ok(Shown::Hidden),

@@ -157,7 +157,7 @@ fn a_lost_device_is_opened_again_and_the_frames_asked_for_are_counted() {
         &display,
         simulator.channel(),
         SIZE,
-        &["--visibility", "none", "--lose-device-after", "1"],
+        &["--visibility", "none", "--fault", "device@1"],
     );
     window.wait("the device's loss", |w| w.said("it was opened again"));
     window.rest(&mut simulator);
@@ -165,6 +165,66 @@ fn a_lost_device_is_opened_again_and_the_frames_asked_for_are_counted() {
     window.terminate();
     window.expect_end();
     let mut window = Window::open(&display, simulator.channel(), SIZE, &["--frames", "1"]);
+    window.expect_end();
+}
+
+/// Whatever happens to its surface, the window shows the picture again that the headless renderer makes.
+#[test]
+fn a_lost_or_outdated_surface_and_a_suspension_are_recovered_from() {
+    let Some((display, mut renderer)) = ready() else { return };
+    let mut simulator = Simulator::start("surface");
+    for fault in ["surface", "outdated", "timeout", "suspend"] {
+        let fault = format!("{fault}@1");
+        let arguments = ["--visibility", "none", "--fault", &fault];
+        let mut window = Window::open(&display, simulator.channel(), SIZE, &arguments);
+        window.wait("the fault", |w| w.said("fault injection"));
+        let before = window.presented();
+        window.wait("a picture after it", |w| w.presented() > before);
+        assert_eq!(window.said("was lost and made anew"), fault.starts_with("surface"));
+        assert!(!window.said("it was opened again"), "the device has not failed");
+        window.rest(&mut simulator);
+        compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+        window.terminate();
+        window.expect_end();
+    }
+}
+
+/// A window that nobody can see draws nothing while the light changes, and shows the newest light when it can be seen.
+#[test]
+fn a_hidden_window_draws_nothing_and_catches_up() {
+    let Some((display, mut renderer)) = ready() else { return };
+    let mut simulator = Simulator::start("hidden");
+    let mut window = Window::open(&display, simulator.channel(), SIZE, &["--visibility", "none"]);
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+
+    // Another window lies over all of it.
+    let larger = (SIZE.0 + 60, SIZE.1 + 60);
+    let mut cover = Window::open(&display, simulator.channel(), larger, &["--show", "normal"]);
+    cover.rest(&mut simulator);
+    let before = (window.presented(), cover.presented());
+    simulator.restart();
+    cover.wait("pictures of the next run", |w| w.presented() > before.1 + 1);
+    cover.rest(&mut simulator);
+    assert_eq!(window.presented(), before.0, "it cannot be seen");
+    cover.terminate();
+    cover.expect_end();
+    window.wait("a picture once it can be seen", |w| w.presented() > before.0);
+    window.focus();
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+
+    // Taken off the screen and put back, as minimising does.
+    window.unmap();
+    simulator.restart();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let before = window.presented();
+    window.map();
+    window.wait("a picture once it is back", |w| w.presented() > before);
+    window.focus();
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    window.terminate();
     window.expect_end();
 }
 

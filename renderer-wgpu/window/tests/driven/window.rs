@@ -140,6 +140,24 @@ impl<'a> Window<'a> {
         self.display.hands(&["windowsize", &id, &width.to_string(), &height.to_string()]);
     }
 
+    /// Gives it the keyboard.
+    pub(crate) fn focus(&mut self) {
+        let id = self.id();
+        self.display.hands(&["windowfocus", "--sync", &id]);
+    }
+
+    /// Takes it off the screen.
+    pub(crate) fn unmap(&mut self) {
+        let id = self.id();
+        self.display.hands(&["windowunmap", "--sync", &id]);
+    }
+
+    /// Puts it back.
+    pub(crate) fn map(&mut self) {
+        let id = self.id();
+        self.display.hands(&["windowmap", "--sync", &id]);
+    }
+
     /// Presses the key for a screenshot and reads the file.
     pub(crate) fn screenshot(&mut self) -> Shot {
         self.shots += 1;
