@@ -1,7 +1,7 @@
 //! Turns scenes and numbers of lights into the tables of paper A: time of a picture by each accumulation, with its error.
 //!
-//! `cargo bench -p photonstream-renderer-wgpu --bench tables [PART]` writes Markdown; PART is `accumulations`, `many`,
-//! `uploads` or `passes`. Times are medians of the wall clock until the device has finished. Scenes whose files are
+//! `cargo bench -p photonstream-renderer-wgpu --bench tables [PART [SIZE]]` writes Markdown; PART is `accumulations`,
+//! `many`, `uploads` or `passes`, SIZE one of the accumulations' (`800x600`, `1280x1024`). Times are medians of the wall clock until the device has finished. Scenes whose files are
 //! missing are left out, loudly.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
@@ -115,7 +115,9 @@ fn range(renderer: &mut Renderer, view: &View) -> f32 {
 
 /// Tables 2 and 3 of paper A, once with every light everywhere and once with a range.
 fn accumulations(gpu: &Gpu) {
-    for size in SIZES {
+    let only = std::env::args().skip(1).filter(|a| !a.starts_with('-')).nth(1);
+    let wanted = |(w, h): &(u32, u32)| only.as_ref().is_none_or(|only| *only == format!("{w}x{h}"));
+    for size in SIZES.into_iter().filter(wanted) {
         println!(
             "### Pictures of {}x{}, ms without a range (with one that costs {:.0} % rel. RMSE at most)\n",
             size.0,
