@@ -34,6 +34,7 @@ Exit codes:
   3    the scene is not valid or cannot be read
   4    the channel is in use, or does not exist
   5    a process that was started failed for good
+  6    no graphics device can draw it
   130  interrupted by a signal before the end";
 
 /// Options of every command.

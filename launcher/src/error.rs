@@ -120,6 +120,9 @@ impl LauncherError {
             Self::Protocol(error)
             | Self::Simulator(SimulatorError::Protocol(error))
             | Self::Render(RenderError::Protocol(error)) => of_protocol(error),
+            Self::Render(RenderError::Device(_)) => exit::DEVICE,
+            #[cfg(feature = "window")]
+            Self::Window(error) if error.is_of_device() => exit::DEVICE,
             Self::Interrupted => exit::INTERRUPTED,
             Self::Usage(_) | Self::UnknownRenderer { .. } => exit::USAGE,
             Self::Child { code, .. } => *code,

@@ -12,6 +12,8 @@ pub(crate) const CONFIG: u8 = 3;
 pub(crate) const CHANNEL: u8 = 4;
 /// A process that was started failed for good.
 pub(crate) const CHILD: u8 = 5;
+/// No graphics device can draw it.
+pub(crate) const DEVICE: u8 = 6;
 /// A signal ended it before its time.
 pub(crate) const INTERRUPTED: u8 = 130;
 
@@ -21,7 +23,7 @@ mod tests {
 
     #[test]
     fn the_help_lists_every_code() {
-        for code in [OK, FAILED, USAGE, CONFIG, CHANNEL, CHILD, INTERRUPTED] {
+        for code in [OK, FAILED, USAGE, CONFIG, CHANNEL, CHILD, DEVICE, INTERRUPTED] {
             assert!(
                 crate::cli::AFTER_HELP
                     .lines()

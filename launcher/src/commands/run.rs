@@ -25,7 +25,8 @@ use std::{
 #[command(after_help = "\
 A renderer NAME that is not built in (cpu, wgpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
 called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V].
-What crashes is started again; a built-in renderer then goes on with the next picture. Several renderers write to folders of their own in DIR.
+What crashes is started again; a built-in renderer then goes on with the next picture. Where no graphics device can draw,
+cpu takes the place of wgpu and of the window. Several renderers write to folders of their own in DIR.
 Without --renderer and --headless a window shows the light, if there is a display and a graphics adapter; closing it ends
 the run. Ctrl-C ends all processes in order, a second one at once.
 
@@ -35,7 +36,7 @@ Examples:
   photonstream run room.toml --renderer cpu --renderer mine --headless --frames 20 --out film
 
 JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers\": [ { \"name\", \"folder\", \"pictures\": [paths],
-  \"restarts\", \"failed\" } ] }")]
+  \"restarts\", \"failed\", \"replaced_by\": null or a name } ] }")]
 pub(crate) struct Args {
     /// Scene [default: the built-in Cornell box]
     config: Option<PathBuf>,
@@ -79,6 +80,7 @@ struct Renderer {
     pictures: Vec<PathBuf>,
     restarts: u32,
     failed: bool,
+    replaced_by: Option<String>,
 }
 
 /// Time between two looks at the children and the channel.
@@ -147,6 +149,7 @@ pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(),
         folder,
         restarts: fate.restarts,
         failed: fate.failed,
+        replaced_by: fate.replaced_by,
     });
     let report = Report {
         scene,
@@ -263,7 +266,12 @@ fn renderer(
     }
     // With several renderers their folders are named after them, and told apart.
     let shown = if of == 1 { name.into() } else { folder.file_name().unwrap_or_default().to_string_lossy() };
-    Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments, sequence })
+    let name_of_stand_in = if of == 1 { "cpu".to_owned() } else { format!("cpu (for {shown})") };
+    let stand_in = (name == "wgpu" || is_window)
+        .then(|| renderer("cpu", of, folder, channel, begun, args, global))
+        .transpose()?
+        .map(|role| Box::new(Role { name: name_of_stand_in, ..role }));
+    Ok(Role { name: shown.into_owned(), kind: Kind::Renderer, plug_in, arguments, sequence, stand_in })
 }
 
 /// Where each renderer writes: `out`, or with several of them `out/NAME`, `out/NAME-2` …

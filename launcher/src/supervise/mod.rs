@@ -37,7 +37,7 @@ pub(crate) struct Supervisor {
 }
 
 /// How one role fared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fate {
     /// Times it was started again.
     pub(crate) restarts: u32,
@@ -45,6 +45,8 @@ pub(crate) struct Fate {
     pub(crate) failed: bool,
     /// Whether it ever ended otherwise than in order.
     pub(crate) crashed: bool,
+    /// Name of what has taken its place.
+    pub(crate) replaced_by: Option<String>,
 }
 
 impl Supervisor {
@@ -121,6 +123,7 @@ impl Supervisor {
             restarts: p.restarts,
             failed: matches!(p.state, State::Failed),
             crashed: p.crashed,
+            replaced_by: p.replaced_by.clone(),
         };
         self.processes.iter().filter(|p| p.is(kind)).map(fate).collect()
     }

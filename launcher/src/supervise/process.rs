@@ -34,6 +34,8 @@ pub(super) struct Process {
     pub(super) restarts: u32,
     /// It ended otherwise than in order at least once: it may have left something behind.
     pub(super) crashed: bool,
+    /// Name of what has taken its place.
+    pub(super) replaced_by: Option<String>,
     backoff: Backoff,
 }
 
@@ -41,7 +43,7 @@ impl Process {
     pub(super) fn start(role: Role, output: ChildOutput) -> Result<Self, LauncherError> {
         let first = role.sequence.as_ref().map_or_else(Vec::new, Sequence::whole);
         let state = spawn(&role, &first, output)?;
-        Ok(Self { role, state, restarts: 0, crashed: false, backoff: Backoff::default() })
+        Ok(Self { role, state, restarts: 0, crashed: false, replaced_by: None, backoff: Backoff::default() })
     }
 
     /// Looks whether it has ended. The error is that of a process that failed for good.
@@ -77,6 +79,11 @@ impl Process {
             self.state = State::Failed;
             return Err(LauncherError::Child { name: name.clone(), how: "cannot run".into(), said, code });
         }
+        // The device will not do better, and others need none. One that has drawn before may recover.
+        let never_drew = !self.role.sequence.as_ref().is_some_and(Sequence::has_begun);
+        if code == Some(exit::DEVICE) && never_drew && self.replace(&how, &said) {
+            return Ok(());
+        }
         let complaint = status.code().map(|code| format!("{code} {}", said.join("\n")));
         match self.backoff.failed(uptime, complaint) {
             Verdict::Retry(pause) => {
@@ -87,12 +94,28 @@ impl Process {
                 self.state = State::Waiting { until: Instant::now() + pause };
                 Ok(())
             }
+            Verdict::GiveUp if self.replace(&how, &said) => Ok(()),
             Verdict::GiveUp => {
                 self.state = State::Failed;
                 let how = format!("{how}, after {} restarts", self.restarts);
                 Err(LauncherError::Child { name: name.clone(), how, said, code: exit::CHILD })
             }
         }
+    }
+
+    /// Lets its stand-in take its place; whether it has one.
+    fn replace(&mut self, how: &str, said: &[String]) -> bool {
+        let Some(stand_in) = self.role.stand_in.take() else { return false };
+        let words = said.last().map_or_else(String::new, |line| format!(" ({line})"));
+        let pictures = stand_in.sequence.as_ref().map_or_else(String::new, |sequence| {
+            format!(" and writes pictures to {}", sequence.folder.display())
+        });
+        tracing::warn!("{} {how}{words}; {} takes its place{pictures}", self.role.name, stand_in.name);
+        self.replaced_by = Some(stand_in.name.clone());
+        self.role = *stand_in;
+        self.backoff = Backoff::default();
+        self.state = State::Waiting { until: Instant::now() };
+        true
     }
 
     /// Starts it again if the time has come. The error is that of a process that cannot be started any more.

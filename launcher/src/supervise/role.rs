@@ -31,6 +31,8 @@ pub(crate) struct Role {
     pub(crate) arguments: Vec<OsString>,
     /// Its pictures, if it can go on with those of an earlier process.
     pub(crate) sequence: Option<Sequence>,
+    /// What takes its place where no graphics device can draw.
+    pub(crate) stand_in: Option<Box<Role>>,
 }
 
 impl Role {

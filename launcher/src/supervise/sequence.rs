@@ -32,6 +32,11 @@ impl Sequence {
         self.frames.iter().map(|frames| format!("--frames={frames}").into()).collect()
     }
 
+    /// Whether there is a picture already.
+    pub(super) fn has_begun(&self) -> bool {
+        self.highest() > 0
+    }
+
     /// The highest number of a finished picture; its PNG is written last.
     fn highest(&self) -> u64 {
         let entries = std::fs::read_dir(&self.folder).into_iter().flatten().flatten();

@@ -112,10 +112,27 @@ fn options_that_cannot_be_are_refused_in_words() {
     said.expect(1, &["visibility: found ao, expected none or rays here", "--renderer wgpu"]);
     let gpu = [&render[..], &["--renderer", "wgpu"]].concat();
     let said = ground.run(&[&gpu[..], &["--adapter", "no such adapter"]].concat());
-    said.expect(1, &["no graphics adapter can be used", "--renderer cpu"]);
+    said.expect(6, &["no graphics adapter can be used", "--renderer cpu"]);
     // A machine without any driver.
     let mut command = ground.command(&gpu);
     command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json");
     let said = ground.start_command(command).wait();
-    said.expect(1, &["no graphics adapter can be used", "install a Vulkan driver"]);
+    said.expect(6, &["no graphics adapter can be used", "install a Vulkan driver"]);
+}
+
+/// A graphics device that cannot draw is replaced by the CPU, which makes all the pictures and is named in the report.
+#[test]
+fn the_cpu_takes_the_place_of_a_device_that_cannot_draw() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let line = "--renderer wgpu --headless --frames 2 --vsls 50 --pool 4096 --size 24x24 --visibility none --out film --json";
+    let arguments: Vec<_> = ["run", &scene].into_iter().chain(line.split_whitespace()).collect();
+    let mut command = ground.command(&arguments);
+    command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json");
+    let said = ground.start_command(command).wait();
+    said.expect(0, &["no graphics adapter can be used", "cpu takes its place", "film"]);
+    let report: serde_json::Value = serde_json::from_str(&said.stdout).unwrap();
+    let renderer = &report["renderers"][0];
+    assert_eq!((&renderer["replaced_by"], &renderer["failed"]), (&json!("cpu"), &json!(false)));
+    assert_eq!(files(&ground.path("film"), "png"), 2);
 }
