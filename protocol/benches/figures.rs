@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use memmap2::{Mmap, MmapMut};
 use photonstream_protocol::{
-    AccessMode, ChannelName, ChunkSet, ControlServer, FrameSource, Liveness, Publisher, Reading, Runtime,
-    SegmentSpec, StatisticsRecord, Subscriber, VslRecord,
+    AccessMode, ChannelName, ChunkSet, ControlServer, FrameSource, Liveness, NOTICE_CAPACITY, Publisher,
+    Reading, Runtime, SegmentSpec, StatisticsRecord, Subscriber, VslRecord,
 };
 
 const ROUNDS: usize = 400;
@@ -43,6 +43,7 @@ fn publisher(runtime: &Runtime, count: usize) -> Publisher {
         object_capacity: 16,
         light_capacity: 4,
         scene_text_capacity: 4096,
+        notice_capacity: NOTICE_CAPACITY,
         scene_hash: 0,
         slots: 3,
     };
@@ -57,6 +58,7 @@ fn publish(publisher: &mut Publisher, vsls: &[VslRecord], changed: &ChunkSet) {
         lights: &[],
         statistics: &StatisticsRecord::default(),
         scene_text: "bench",
+        notice: "",
         config_generation: 0,
         simulation_time_s: 0.0,
     };

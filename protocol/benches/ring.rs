@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use divan::{Bencher, counter::BytesCount};
 use photonstream_protocol::{
-    AccessMode, ChannelName, ChunkSet, FrameSource, Publisher, Reading, Runtime, SegmentSpec,
-    StatisticsRecord, Subscriber, VslRecord, monotonic_ns,
+    AccessMode, ChannelName, ChunkSet, FrameSource, NOTICE_CAPACITY, Publisher, Reading, Runtime,
+    SegmentSpec, StatisticsRecord, Subscriber, VslRecord, monotonic_ns,
 };
 
 fn main() {
@@ -31,6 +31,7 @@ impl Channel {
             object_capacity: 16,
             light_capacity: 4,
             scene_text_capacity: 4096,
+            notice_capacity: NOTICE_CAPACITY,
             scene_hash: 0,
             slots: 3,
         };
@@ -47,6 +48,7 @@ impl Channel {
             lights: &[],
             statistics: &self.statistics,
             scene_text: "bench",
+            notice: "",
             config_generation: 0,
             simulation_time_s: 0.0,
         };

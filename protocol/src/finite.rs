@@ -95,7 +95,7 @@ pub(crate) fn all_finite(kind: ArrayKind, words: &[u64]) -> bool {
         ArrayKind::Object => OBJECT.all_finite::<16>(words),
         ArrayKind::Light => LIGHT.all_finite::<16>(words),
         ArrayKind::Statistics => STATISTICS.all_finite::<32>(words),
-        ArrayKind::SceneText => true,
+        ArrayKind::SceneText | ArrayKind::Notice => true,
     }
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn load(kind: ArrayKind, from: &[AtomicU64], into: &mut [u64]) -> boo
         ArrayKind::Object => OBJECT.load::<16>(from, into),
         ArrayKind::Light => LIGHT.load::<16>(from, into),
         ArrayKind::Statistics => STATISTICS.load::<32>(from, into),
-        ArrayKind::SceneText => TEXT.load::<8>(from, into),
+        ArrayKind::SceneText | ArrayKind::Notice => TEXT.load::<8>(from, into),
     }
 }
 

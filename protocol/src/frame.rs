@@ -8,6 +8,7 @@ use crate::record::{ArrayKind, LightRecord, ObjectRecord, StatisticsRecord, VslR
 use crate::ring_read::Head;
 use crate::shape::head;
 use crate::staging::{ArrayView, Patch, Staging};
+use crate::text;
 
 /// A complete, coherent frame in private memory.
 #[derive(Debug, Clone, Default)]
@@ -36,18 +37,22 @@ pub struct VslFrame {
     pub statistics: StatisticsRecord,
     /// The resolved scene; the same allocation for as long as the text stays the same.
     pub scene_text: Arc<str>,
+    /// What is wrong with the simulation, empty while nothing is; the same allocation for as long as it stays the same.
+    pub notice: Arc<str>,
 }
 
 const ARRAYS: usize = ArrayKind::ALL.len();
 const VSL: usize = 0;
 const TEXT: usize = 4;
+const NOTICE: usize = 5;
 /// Words of a chunk of lights.
 const CHUNK_WORDS: usize = CHUNK_RECORDS * size_of::<VslRecord>() / 8;
 
 #[derive(Default)]
 struct Buffer {
     frame: VslFrame,
-    text: Vec<[u64; 8]>,
+    /// Records of the scene text and of the notice.
+    texts: [Vec<[u64; 8]>; 2],
     versions: [Vec<u64>; ARRAYS],
 }
 
@@ -57,7 +62,7 @@ impl Buffer {
             0 => self.frame.vsls.resize_with(records, VslRecord::default),
             1 => self.frame.objects.resize_with(records, ObjectRecord::default),
             2 => self.frame.lights.resize_with(records, LightRecord::default),
-            TEXT => self.text.resize(records, [0; 8]),
+            TEXT | NOTICE => self.texts[a - TEXT].resize(records, [0; 8]),
             _ => {}
         }
         self.versions[a].resize(records.div_ceil(CHUNK_RECORDS), 0);
@@ -71,7 +76,7 @@ impl Buffer {
             3 => {
                 bytemuck::cast_slice(&std::slice::from_ref(&self.frame.statistics)[..self.versions[a].len()])
             }
-            _ => self.text.as_flattened(),
+            _ => self.texts[a - TEXT].as_flattened(),
         }
     }
 
@@ -85,7 +90,7 @@ impl Buffer {
                 let records = versions.len();
                 bytemuck::cast_slice_mut(&mut std::slice::from_mut(&mut self.frame.statistics)[..records])
             }
-            _ => self.text.as_flattened_mut(),
+            _ => self.texts[a - TEXT].as_flattened_mut(),
         };
         (words, versions)
     }
@@ -147,7 +152,8 @@ impl FramePair {
         scene_hash: u64,
         changed: &mut ChunkSet,
     ) -> Result<(), ProtocolError> {
-        let text = self.scene_text(words[head::TEXT_BYTES])?;
+        let text = self.text(TEXT, &self.front.frame.scene_text, words[head::TEXT_BYTES])?;
+        let notice = self.text(NOTICE, &self.front.frame.notice, words[head::NOTICE_BYTES])?;
         let simulation_time_s = f64::from_bits(words[head::SIMULATION_TIME_S]);
         if !simulation_time_s.is_finite() {
             return Err(ProtocolError::corrupt("simulation time", simulation_time_s, "a finite number"));
@@ -172,6 +178,7 @@ impl FramePair {
         back.frame.chunk_frames.clone_from(&back.versions[VSL]);
         let frame = &mut back.frame;
         frame.scene_text = text;
+        frame.notice = notice;
         frame.epoch = epoch;
         frame.scene_hash = scene_hash;
         frame.frame = words[head::FRAME];
@@ -183,26 +190,12 @@ impl FramePair {
         Ok(())
     }
 
-    /// The staged scene text: the last frame's own where no chunk of it changed.
-    fn scene_text(&self, bytes: u64) -> Result<Arc<str>, ProtocolError> {
-        let last = &self.front.frame.scene_text;
-        if self.complete
-            && bytes == last.len() as u64
-            && self.front.versions[TEXT] == self.back.versions[TEXT]
-        {
+    /// The staged text of array `a`: the last frame's own where no chunk of it changed.
+    fn text(&self, a: usize, last: &Arc<str>, bytes: u64) -> Result<Arc<str>, ProtocolError> {
+        if self.complete && bytes == last.len() as u64 && self.front.versions[a] == self.back.versions[a] {
             return Ok(Arc::clone(last));
         }
-        let staged: &[u8] = bytemuck::cast_slice(self.back.text.as_flattened());
-        let staged = usize::try_from(bytes).ok().and_then(|bytes| staged.get(..bytes));
-        let staged = staged.ok_or_else(|| {
-            ProtocolError::corrupt(
-                "scene text length",
-                bytes,
-                format!("at most {}", self.back.text.len() * 64),
-            )
-        })?;
-        let text = std::str::from_utf8(staged)
-            .map_err(|error| ProtocolError::corrupt("scene text", error, "valid UTF-8"))?;
-        Ok(Arc::from(text))
+        let name = if a == TEXT { "scene text" } else { "notice" };
+        text::read(name, &self.back.texts[a - TEXT], bytes)
     }
 }

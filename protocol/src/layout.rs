@@ -7,13 +7,16 @@ use crate::error::ProtocolError;
 use crate::process::{Identity, boot_id};
 use crate::record::{ArrayKind, LAYOUT_HASH};
 use crate::shape::{ArrayShape, HEAD_WORDS, Shape, head};
+use crate::text::TEXT_RECORD;
 
 /// First eight bytes of every segment.
 pub const MAGIC: [u8; 8] = *b"PHOTONS1";
 /// Major version: another one cannot be read.
-pub const ABI_MAJOR: u64 = 1;
+pub const ABI_MAJOR: u64 = 2;
 /// Minor version: a greater one adds arrays that older readers skip.
 pub const ABI_MINOR: u64 = 0;
+/// Bytes of UTF-8 a notice may have, unless there is a reason for another number.
+pub const NOTICE_CAPACITY: u32 = 4096;
 /// As the writer's machine stores it.
 pub const ENDIAN_TAG: u64 = 0x0102_0304_0506_0708;
 
@@ -84,6 +87,8 @@ pub struct SegmentSpec {
     pub light_capacity: u32,
     /// Greatest length of the resolved scene text, in bytes of UTF-8.
     pub scene_text_capacity: u32,
+    /// Greatest length of the notice, in bytes of UTF-8: [`NOTICE_CAPACITY`] unless there is a reason.
+    pub notice_capacity: u32,
     /// Identifies the scene.
     pub scene_hash: u64,
     /// Complete frames held at once, 2 to 8; 3 unless there is a reason.
@@ -119,6 +124,7 @@ impl Layout {
             ("object_capacity", spec.object_capacity),
             ("light_capacity", spec.light_capacity),
             ("scene_text_capacity", spec.scene_text_capacity),
+            ("notice_capacity", spec.notice_capacity),
         ] {
             if found > MAX_RECORDS {
                 return Err(invalid(field, found, format!("at most {MAX_RECORDS}")));
@@ -131,7 +137,8 @@ impl Layout {
                 ArrayKind::Object => spec.object_capacity as usize,
                 ArrayKind::Light => spec.light_capacity as usize,
                 ArrayKind::Statistics => 1,
-                ArrayKind::SceneText => (spec.scene_text_capacity as usize).div_ceil(64),
+                ArrayKind::SceneText => (spec.scene_text_capacity as usize).div_ceil(TEXT_RECORD),
+                ArrayKind::Notice => (spec.notice_capacity as usize).div_ceil(TEXT_RECORD),
             };
             let table = end.next_multiple_of(LINE);
             end = table + capacity.div_ceil(CHUNK_RECORDS) * 8;

@@ -35,6 +35,7 @@ mod runtime;
 mod shape;
 mod staging;
 mod subscriber;
+mod text;
 mod words;
 mod writer_segment;
 
@@ -43,7 +44,7 @@ pub use chunks::{CHUNK_RECORDS, ChunkSet};
 pub use control::{ControlClient, ControlServer, Incoming, Replier, Reply, Request};
 pub use error::ProtocolError;
 pub use frame::VslFrame;
-pub use layout::{ABI_MAJOR, ABI_MINOR, ENDIAN_TAG, MAGIC, SegmentSpec};
+pub use layout::{ABI_MAJOR, ABI_MINOR, ENDIAN_TAG, MAGIC, NOTICE_CAPACITY, SegmentSpec};
 pub use mapped_segment::{MappedFrame, MappedSegment};
 pub use process::monotonic_ns;
 pub use publisher::{FrameSource, Publisher};

@@ -12,6 +12,7 @@ use crate::process::{Identity, monotonic_ns};
 use crate::record::{LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
 use crate::ring_write::{ArraySource, Changed, FrameHead, RingWriter};
 use crate::runtime::{ChannelDir, ChannelName, Current, Runtime};
+use crate::text::{PublishedText, fitted};
 use crate::writer_segment::WriterSegment;
 
 /// Content of one frame, borrowed from the simulator.
@@ -30,6 +31,9 @@ pub struct FrameSource<'a> {
     pub statistics: &'a StatisticsRecord,
     /// The resolved scene, from which a renderer parses exactly what the simulator runs.
     pub scene_text: &'a str,
+    /// What is wrong with the simulation (an edited config that was refused, for one), empty while nothing is; cut to the
+    /// segment's capacity.
+    pub notice: &'a str,
     /// Counts the configurations that were loaded.
     pub config_generation: u64,
     /// Time of the simulated scene, in s.
@@ -44,8 +48,8 @@ pub struct Publisher {
     writer: RingWriter,
     heartbeat: Heartbeat,
     frame: Arc<AtomicU64>,
-    text: String,
-    text_words: Vec<u64>,
+    text: PublishedText,
+    notice: PublishedText,
     process: u32,
     abandoned: bool,
 }
@@ -96,8 +100,8 @@ impl Publisher {
             segment,
             heartbeat,
             frame: Arc::new(AtomicU64::new(0)),
-            text: String::new(),
-            text_words: Vec::new(),
+            text: PublishedText::default(),
+            notice: PublishedText::default(),
             process: std::process::id(),
             abandoned: false,
         })
@@ -153,13 +157,8 @@ impl Publisher {
         if self.heartbeat.name_is_lost() {
             self.regenerate()?;
         }
-        if self.text != frame.scene_text {
-            frame.scene_text.clone_into(&mut self.text);
-            self.text_words.clear();
-            self.text_words.resize(self.text.len().div_ceil(64) * 8, 0);
-            bytemuck::cast_slice_mut(&mut self.text_words)[..self.text.len()]
-                .copy_from_slice(self.text.as_bytes());
-        }
+        self.text.set(frame.scene_text);
+        self.notice.set(&fitted(frame.notice, self.spec.notice_capacity as usize));
         let now = monotonic_ns();
         let statistics = [StatisticsRecord { published_ns: now, ..*frame.statistics }];
         let array = |words, stamp, changed| ArraySource { words, changed, stamp };
@@ -172,13 +171,15 @@ impl Publisher {
             array(bytemuck::cast_slice(frame.objects), false, Changed::Compare),
             array(bytemuck::cast_slice(frame.lights), false, Changed::Compare),
             array(bytemuck::cast_slice(&statistics), false, Changed::Compare),
-            array(&self.text_words, false, Changed::Compare),
+            array(self.text.words(), false, Changed::Compare),
+            array(self.notice.words(), false, Changed::Compare),
         ];
         let head = FrameHead {
             publish_time_ns: now,
             simulation_time_s: frame.simulation_time_s,
             config_generation: frame.config_generation,
-            text_bytes: self.text.len() as u64,
+            text_bytes: self.text.bytes(),
+            notice_bytes: self.notice.bytes(),
         };
         let number = self.writer.publish(self.segment.words(), &head, &sources)?;
         self.frame.store(number, Ordering::Relaxed);

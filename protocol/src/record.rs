@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::text::TEXT_RECORD;
+
 /// Machine type of a record's field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FieldType {
@@ -108,7 +110,7 @@ record! {
         generation: u32,
         /// Affine map from object to world space in metres: three axes and the origin, column by column.
         world_from_object: [f64; 12],
-        /// Bits, none assigned in ABI 1: zero.
+        /// Bits, none assigned in ABI 2: zero.
         flags: u32,
         /// Zero.
         reserved: [u32; 5],
@@ -188,12 +190,28 @@ record! {
         traced_ns: u64,
         /// When it was published, monotonic ns; set by the publisher.
         published_ns: u64,
+        /// Samples of the present light beyond those that the pool holds.
+        refined_paths: u64,
+        /// Standard error of the flux relative to it, mean over all lights weighted by flux; 0 while it is unknown.
+        relative_error: f64,
+        /// The relative error at which the simulator rests; 0 for none.
+        target_error: f64,
+        /// Rays of paths that edits left valid, since the start: what tracing everything again would have cost.
+        rays_saved: u64,
+        /// Slots that the pool may have at most; `pool_paths` are in use.
+        pool_capacity: u64,
+        /// Measured time from the arrival of the last change until all its light was traced, in ms.
+        latency_ms: f64,
+        /// The latency that the simulator aims at, in ms; 0 for none.
+        latency_target_ms: f64,
+        /// Paths traced again because of edits, since the start.
+        retraced_paths: u64,
         /// Zero.
-        reserved: [u64; 10],
+        reserved: [u64; 2],
     }
 }
 
-/// What the five arrays of a slot hold; the number is the array's kind in the header.
+/// What the six arrays of a slot hold; the number is the array's kind in the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum ArrayKind {
@@ -207,11 +225,14 @@ pub enum ArrayKind {
     Statistics = 4,
     /// UTF-8 text of the resolved scene, 64 bytes a record, zero-filled.
     SceneText = 5,
+    /// UTF-8 text of what is wrong with the simulation, 64 bytes a record, zero-filled; empty while nothing is.
+    Notice = 6,
 }
 
 impl ArrayKind {
     /// All arrays, in the order in which they lie in a slot.
-    pub const ALL: [Self; 5] = [Self::Vsl, Self::Object, Self::Light, Self::Statistics, Self::SceneText];
+    pub const ALL: [Self; 6] =
+        [Self::Vsl, Self::Object, Self::Light, Self::Statistics, Self::SceneText, Self::Notice];
 
     /// Name in messages and in the documentation.
     pub const fn name(self) -> &'static str {
@@ -221,6 +242,7 @@ impl ArrayKind {
             Self::Light => "light",
             Self::Statistics => "statistics",
             Self::SceneText => "scene_text",
+            Self::Notice => "notice",
         }
     }
 
@@ -231,7 +253,7 @@ impl ArrayKind {
             Self::Object => size_of::<ObjectRecord>(),
             Self::Light => size_of::<LightRecord>(),
             Self::Statistics => size_of::<StatisticsRecord>(),
-            Self::SceneText => 64,
+            Self::SceneText | Self::Notice => TEXT_RECORD,
         }
     }
 
@@ -242,7 +264,7 @@ impl ArrayKind {
             Self::Object => ObjectRecord::FIELDS,
             Self::Light => LightRecord::FIELDS,
             Self::Statistics => StatisticsRecord::FIELDS,
-            Self::SceneText => &[],
+            Self::SceneText | Self::Notice => &[],
         }
     }
 }
@@ -301,13 +323,13 @@ mod tests {
                 assert_eq!(field.offset, next, "{}.{}", kind.name(), field.name);
                 next += field.size;
             }
-            assert!(next == kind.record_bytes() || kind == ArrayKind::SceneText);
+            assert!(next == kind.record_bytes() || kind.fields().is_empty());
         }
     }
 
     /// A changed value here is a changed ABI: renderers of another release refuse it.
     #[test]
-    fn layout_hash_is_the_one_of_abi_1() {
-        assert_eq!(LAYOUT_HASH, 0x5b22_0d1d_f6f8_d7fd, "{LAYOUT_HASH:#018x}");
+    fn layout_hash_is_the_one_of_abi_2() {
+        assert_eq!(LAYOUT_HASH, 0x88fd_c834_7067_7587, "{LAYOUT_HASH:#018x}");
     }
 }

@@ -56,8 +56,7 @@ fn frames_are_whole_on_heap_memory() {
     std::thread::scope(|scope| {
         scope.spawn(move || {
             let mut writer = RingWriter::new(shape(), 0);
-            let head =
-                FrameHead { publish_time_ns: 0, simulation_time_s: 0.0, config_generation: 0, text_bytes: 0 };
+            let head = FrameHead::default();
             for frame in 1..=frames {
                 let content = content(frame);
                 let source = ArraySource { words: &content, changed: Changed::Compare, stamp: false };

@@ -122,7 +122,7 @@ fn content(frame: u64) -> [u64; CHUNKS] {
 }
 
 fn publish(writer: &mut RingWriter, words: &LoomWords, frame: u64) {
-    let head = FrameHead { publish_time_ns: 0, simulation_time_s: 0.0, config_generation: 0, text_bytes: 0 };
+    let head = FrameHead::default();
     let sources = [ArraySource { words: &content(frame), changed: Changed::Compare, stamp: false }];
     assert_eq!(writer.publish(words, &head, &sources).unwrap(), frame);
 }

@@ -23,11 +23,13 @@ pub(crate) struct ArraySource<'a> {
 }
 
 /// The head of the frame; the writer adds sequence, frame, counts and change sum.
+#[derive(Default)]
 pub(crate) struct FrameHead {
     pub(crate) publish_time_ns: u64,
     pub(crate) simulation_time_s: f64,
     pub(crate) config_generation: u64,
     pub(crate) text_bytes: u64,
+    pub(crate) notice_bytes: u64,
 }
 
 /// What the writer remembers of one array.
@@ -106,6 +108,7 @@ impl RingWriter {
         words.store(slot + head::CONFIG_GENERATION, frame_head.config_generation);
         words.store(slot + head::CHANGE_SUM, change_sum);
         words.store(slot + head::TEXT_BYTES, frame_head.text_bytes);
+        words.store(slot + head::NOTICE_BYTES, frame_head.notice_bytes);
 
         // Release for a reader that finds the slot by scanning sequences; ours goes through `latest`.
         words.store_release(slot + head::SEQUENCE, 2 * frame, ReleaseStore::Sequence);

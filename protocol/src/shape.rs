@@ -21,6 +21,8 @@ pub(crate) mod head {
     pub(crate) const CHANGE_SUM: usize = 5;
     /// Bytes of the scene text.
     pub(crate) const TEXT_BYTES: usize = 6;
+    /// Bytes of the notice.
+    pub(crate) const NOTICE_BYTES: usize = 7;
     /// Records of the first array; those of the others follow.
     pub(crate) const COUNTS: usize = 8;
 }

@@ -304,3 +304,31 @@ fn waiting_ends_for_each_reason() {
         ));
     }
 }
+
+/// A notice comes and goes without anything else, is cut where it is too long, and follows into another segment.
+#[test]
+fn notices_come_and_go() {
+    for mode in MODES {
+        let (_root, runtime, channel, mut publisher) = start(10);
+        let mut reader = Subscriber::attach_in(&runtime, &channel, mode).unwrap();
+        let statistics = Default::default();
+        let long = "ä".repeat(200);
+        let mut found = Vec::new();
+        for notice in ["", "room.toml:3:7", "room.toml:3:7", &long, "room.toml:3:7", ""] {
+            publisher.publish(&FrameSource { notice, ..Content::default_source(&statistics) }).unwrap();
+            assert_eq!(read(&mut reader), Reading::New);
+            found.push(std::sync::Arc::clone(&reader.frame().unwrap().notice));
+        }
+        // 256 bytes: 126 letters of two bytes, and four bytes that say that there was more.
+        let cut = format!("{} …", "ä".repeat(126));
+        let texts: Vec<&str> = found.iter().map(|text| &**text).collect();
+        assert_eq!(texts, ["", "room.toml:3:7", "room.toml:3:7", &cut, "room.toml:3:7", ""]);
+        assert!(std::sync::Arc::ptr_eq(&found[1], &found[2]));
+        let none = photonstream_protocol::SegmentSpec { notice_capacity: 0, ..spec(10) };
+        publisher.replace_segment(&none).unwrap();
+        let source = FrameSource { notice: "cannot be told", ..Content::default_source(&statistics) };
+        publisher.publish(&source).unwrap();
+        while reader.read().unwrap() != Reading::New {}
+        assert_eq!(&*reader.frame().unwrap().notice, "");
+    }
+}

@@ -108,10 +108,10 @@ fn every_flipped_header_bit_is_refused() {
 #[test]
 fn foreign_segments_are_told_apart() {
     let victim = Victim::new();
-    victim.write_header(&[(1, 2)]);
+    victim.write_header(&[(1, 3)]);
     assert!(matches!(
         victim.attach(AccessMode::Mapped),
-        Err(ProtocolError::VersionMismatch { found_major: 2, expected: 1, .. })
+        Err(ProtocolError::VersionMismatch { found_major: 3, expected: 2, .. })
     ));
     victim.write_header(&[(2, 9)]);
     victim.attach(AccessMode::Mapped).unwrap();

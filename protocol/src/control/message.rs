@@ -40,6 +40,13 @@ pub enum Request {
         /// New values by key.
         values: Map<String, Value>,
     },
+    /// Change properties of a material, by the keys of the configuration.
+    SetMaterial {
+        /// Name of the material.
+        name: String,
+        /// New values by key.
+        values: Map<String, Value>,
+    },
     /// Change streaming settings, by the keys of the configuration.
     SetStreaming {
         /// New values by key.
@@ -80,8 +87,7 @@ impl Reply {
 }
 
 /// Types of requests, for the message to those who sent another one.
-const REQUEST_TYPES: &str =
-    "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_streaming";
+const REQUEST_TYPES: &str = "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_material, set_streaming";
 
 impl Request {
     /// Parses one message; the error is the reply that its sender gets.
@@ -107,9 +113,10 @@ mod tests {
         let values: Map<String, Value> =
             [("power_w".to_owned(), serde_json::json!([80.0, 60.0, 40.0]))].into_iter().collect();
         for request in [
-            Request::Hello { abi: 1 },
+            Request::Hello { abi: 2 },
             Request::Pause,
             Request::SetLight { name: "lamp".into(), values: values.clone() },
+            Request::SetMaterial { name: "red".into(), values: values.clone() },
             Request::SetStreaming { values },
         ] {
             assert_eq!(Request::parse(&encode(&request).unwrap()).unwrap(), request);

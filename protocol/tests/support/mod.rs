@@ -17,6 +17,7 @@ pub fn spec(vsls: u32) -> SegmentSpec {
         object_capacity: 100,
         light_capacity: 8,
         scene_text_capacity: 4096,
+        notice_capacity: 256,
         scene_hash: 0xabc,
         slots: 3,
     }
@@ -36,6 +37,7 @@ pub struct Content {
     pub lights: Vec<LightRecord>,
     pub statistics: StatisticsRecord,
     pub text: String,
+    pub notice: String,
     pub changed: ChunkSet,
     pub frame: u64,
 }
@@ -89,6 +91,7 @@ impl Content {
         self.statistics =
             StatisticsRecord { paths_total: frame, paths_per_s: frame as f64, ..Default::default() };
         self.text = format!("# scene, generation {}\n", frame / 10).repeat(1 + (frame / 10 % 5) as usize);
+        self.notice = "refused, ".repeat((frame / 7 % 4) as usize);
         self.frame = frame;
     }
 
@@ -101,6 +104,7 @@ impl Content {
             lights: &self.lights,
             statistics: &self.statistics,
             scene_text: &self.text,
+            notice: &self.notice,
             config_generation: self.frame / 10,
             simulation_time_s: self.frame as f64 * 0.25,
         }
@@ -119,6 +123,7 @@ pub fn check(frame: &VslFrame) {
     assert_eq!(frame.statistics.paths_total, f);
     assert_eq!(frame.statistics.paths_per_s, f as f64);
     assert_eq!(*frame.scene_text, *expected.text, "text of frame {f}");
+    assert_eq!(*frame.notice, *expected.notice, "notice of frame {f}");
     assert_eq!((frame.config_generation, frame.simulation_time_s), (f / 10, f as f64 * 0.25));
 }
 
@@ -192,6 +197,7 @@ impl Content {
             lights: &[],
             statistics,
             scene_text: "",
+            notice: "",
             config_generation: 0,
             simulation_time_s: 0.0,
         }

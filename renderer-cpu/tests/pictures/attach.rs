@@ -4,8 +4,8 @@
 
 use photonstream_film::Film;
 use photonstream_protocol::{
-    ChannelName, FrameSource, LightRecord, ObjectRecord, Publisher, Runtime, SegmentSpec, StatisticsRecord,
-    VslRecord,
+    ChannelName, FrameSource, LightRecord, NOTICE_CAPACITY, ObjectRecord, Publisher, Runtime, SegmentSpec,
+    StatisticsRecord, VslRecord,
 };
 use photonstream_scene::Scene;
 use photonstream_shading::LightShape;
@@ -29,6 +29,7 @@ impl Simulator {
             object_capacity: 4,
             light_capacity: 4,
             scene_text_capacity: scene.resolved_text.len() as u32,
+            notice_capacity: NOTICE_CAPACITY,
             scene_hash: scene.hash,
             slots: 3,
         };
@@ -90,6 +91,7 @@ impl Simulator {
             lights: &lights,
             statistics: &statistics,
             scene_text: &scene.resolved_text,
+            notice: "",
             config_generation: 1,
             simulation_time_s: 0.0,
         };

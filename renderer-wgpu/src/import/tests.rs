@@ -40,6 +40,7 @@ impl Channel {
             object_capacity: 1,
             light_capacity: 1,
             scene_text_capacity: 64,
+            notice_capacity: 64,
             scene_hash: 7,
             slots: 3,
         };
@@ -89,6 +90,7 @@ pub(super) fn publish(publisher: &mut Publisher, vsls: &[VslRecord]) -> u64 {
         lights: &[],
         statistics: &StatisticsRecord::default(),
         scene_text: "",
+        notice: "",
         config_generation: 0,
         simulation_time_s: 0.0,
     };

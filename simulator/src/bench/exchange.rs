@@ -2,8 +2,8 @@
 
 use crate::{error::SimulatorError, ledger::Ledger, records, simulation::Simulation};
 use photonstream_protocol::{
-    AccessMode, ChannelName, FrameSource, ProtocolError, Publisher, Reading, SegmentSpec, StatisticsRecord,
-    Subscriber, clean_one,
+    AccessMode, ChannelName, FrameSource, NOTICE_CAPACITY, ProtocolError, Publisher, Reading, SegmentSpec,
+    StatisticsRecord, Subscriber, clean_one,
 };
 use serde::Serialize;
 use std::{hint::black_box, time::Instant};
@@ -36,6 +36,7 @@ impl Exchange {
                 object_capacity: objects.len().max(1) as u32,
                 light_capacity: lights.len().max(1) as u32,
                 scene_text_capacity: scene.resolved_text.len() as u32,
+                notice_capacity: NOTICE_CAPACITY,
                 scene_hash: scene.hash,
                 slots: 3,
             },
@@ -58,6 +59,7 @@ impl Exchange {
                 lights: &lights,
                 statistics: &StatisticsRecord::default(),
                 scene_text: &scene.resolved_text,
+                notice: "",
                 config_generation: 1,
                 simulation_time_s: 0.0,
             })?;

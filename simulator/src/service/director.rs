@@ -10,7 +10,8 @@ use super::{
 use crate::{counters::Counters, error::SimulatorError, records, simulation::Simulation};
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
-    ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, SegmentSpec, monotonic_ns,
+    ChannelName, ControlServer, Incoming, NOTICE_CAPACITY, ProtocolError, Publisher, Reply, Request,
+    SegmentSpec, monotonic_ns,
 };
 use photonstream_scene::Scene;
 use serde::Serialize;
@@ -112,6 +113,7 @@ impl Director {
             object_capacity: still.objects.len().max(1) as u32,
             light_capacity: still.lights.len().max(1) as u32,
             scene_text_capacity: still.scene_text.len() as u32,
+            notice_capacity: NOTICE_CAPACITY,
             scene_hash: scene.hash,
             slots: 3,
         };
@@ -224,6 +226,10 @@ impl Director {
             Request::Reload | Request::SetStreaming { .. } => Reply::error(
                 "unsupported",
                 "this simulator cannot load another config yet; restart it with the edited one",
+            ),
+            Request::SetMaterial { .. } => Reply::error(
+                "unsupported",
+                "this simulator cannot change materials yet; edit the config instead",
             ),
             Request::Hello { .. } | Request::SetLight { .. } | Request::MoveObject { .. } => {
                 Reply::error("internal", "the request should have been answered before")

@@ -128,6 +128,7 @@ impl PublisherActor {
             lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
             scene_text: &snapshot.still.scene_text,
+            notice: "",
             config_generation: 1,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;
