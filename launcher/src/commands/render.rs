@@ -174,7 +174,14 @@ pub(crate) fn simulator(
     arguments.extend(after.map(|paths| format!("--after={paths}").into()));
     arguments.extend(overrides.to_arguments().into_iter().map(OsString::from));
     arguments.extend(verbosity(global));
-    Role { name: "simulator".into(), kind: Kind::Simulator, plug_in: None, arguments, sequence: None }
+    Role {
+        name: "simulator".into(),
+        kind: Kind::Simulator,
+        plug_in: None,
+        arguments,
+        sequence: None,
+        stand_in: None,
+    }
 }
 
 /// The options that make a child as talkative as this process.

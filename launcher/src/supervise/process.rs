@@ -68,7 +68,7 @@ impl Process {
         uptime: Duration,
         said: Vec<String>,
     ) -> Result<(), LauncherError> {
-        let name = &self.role.name;
+        let name = self.role.name.clone();
         let how = describe(status);
         let code = status.code().and_then(|code| u8::try_from(code).ok());
         // What is wrong with the scene, the channel or the command line is still wrong the next time.
@@ -77,7 +77,7 @@ impl Process {
         });
         if let Some(code) = final_code {
             self.state = State::Failed;
-            return Err(LauncherError::Child { name: name.clone(), how: "cannot run".into(), said, code });
+            return Err(LauncherError::Child { name, how: "cannot run".into(), said, code });
         }
         // The device will not do better, and others need none. One that has drawn before may recover.
         let never_drew = !self.role.sequence.as_ref().is_some_and(Sequence::has_begun);
@@ -98,7 +98,7 @@ impl Process {
             Verdict::GiveUp => {
                 self.state = State::Failed;
                 let how = format!("{how}, after {} restarts", self.restarts);
-                Err(LauncherError::Child { name: name.clone(), how, said, code: exit::CHILD })
+                Err(LauncherError::Child { name, how, said, code: exit::CHILD })
             }
         }
     }
