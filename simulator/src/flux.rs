@@ -17,7 +17,7 @@ pub const MAX_DEPOSITS: usize = 1 << 13;
 pub const QUANTUM: f64 = 1.0 / (1u32 << 24) as f64;
 
 /// What a path left on one virtual surface light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct Deposit {
     /// The light.
@@ -35,13 +35,12 @@ impl Deposit {
         (rgb != [0; 3]).then_some(Self { vsl, rgb })
     }
 
-    /// The deposit times `factor`, at most [`MAX_THROUGHPUT`]; `None` where it rounds to nothing.
-    pub(crate) fn scaled(&self, factor: Vec3) -> Option<Self> {
+    /// The deposit times `factor`, at most [`MAX_THROUGHPUT`].
+    pub(crate) fn scaled(&self, factor: Vec3) -> Self {
         let [r, g, b] = self.rgb.map(f64::from);
         let most = f64::from(MAX_THROUGHPUT) / QUANTUM;
         let quanta = (DVec3::new(r, g, b) * factor.as_dvec3()).round().min(DVec3::splat(most));
-        let rgb = quanta.to_array().map(|q| q as i32);
-        (rgb != [0; 3]).then_some(Self { vsl: self.vsl, rgb })
+        Self { vsl: self.vsl, rgb: quanta.to_array().map(|q| q as i32) }
     }
 
     /// Square of the mean channel, in quanta of (2⁻¹¹)².
@@ -146,28 +145,107 @@ impl VslFlux {
         }
     }
 
+    /// Makes a column empty.
+    pub(crate) fn clear(&mut self, column: u32) {
+        let start = column as usize * self.vsls;
+        self.cells[start..start + self.vsls].fill(Cell::default());
+    }
+
     /// Flux of light `vsl` over all columns. A column without paths or without power adds exactly nothing.
     pub fn read(&self, vsl: u32, scales: &[ColumnScale]) -> FluxReading {
+        self.read_with(None, vsl, scales)
+    }
+
+    /// [`VslFlux::read`] of this and `more` together; `scales` count the paths of both.
+    pub(crate) fn read_with(&self, more: Option<&Self>, vsl: u32, scales: &[ColumnScale]) -> FluxReading {
         let mut flux = DVec3::ZERO;
         let mut variance = 0.0;
         let (mut count, mut births) = (0i64, 0i128);
         for (column, scale) in scales.iter().enumerate().filter(|(_, s)| s.paths > 0) {
-            let cell = &self.cells[column * self.vsls + vsl as usize];
+            let cell = self.cell(more, column, vsl);
             let paths = f64::from(scale.paths);
             let watts = scale.watts.as_dvec3();
             let [r, g, b] = cell.rgb.map(|sum| sum as f64 * QUANTUM / paths);
             let mean = DVec3::new(r, g, b);
             flux += watts * mean;
-            let mean_channel = (mean.x + mean.y + mean.z) / 3.0;
-            let mean_square = cell.squares as f64 * (QUANTUM * QUANTUM * (1u64 << 26) as f64) / paths;
-            let mean_watts = (watts.x + watts.y + watts.z) / 3.0;
-            variance +=
-                mean_watts * mean_watts * (mean_square - mean_channel * mean_channel).max(0.0) / paths;
+            variance += cell.variance(scale);
             count += cell.count;
             births += cell.births_ms;
         }
         let mean_birth_ms = (count > 0).then(|| births as f64 / count as f64);
         FluxReading { flux: flux.as_vec3(), standard_error: variance.sqrt() as f32, mean_birth_ms }
+    }
+
+    fn cell(&self, more: Option<&Self>, column: usize, vsl: u32) -> Cell {
+        let index = column * self.vsls + vsl as usize;
+        more.map_or(self.cells[index], |more| self.cells[index] + more.cells[index])
+    }
+
+    /// How uncertain this and `more` together are; `scales` count the paths of both.
+    pub(crate) fn errors(&self, more: Option<&Self>, scales: &[ColumnScale]) -> FluxErrors {
+        let mut sums = FluxErrors { variances: vec![0.0; scales.len()], errors: 0.0, flux: 0.0 };
+        for vsl in 0..self.vsls as u32 {
+            let mut variance = 0.0;
+            for (column, scale) in scales.iter().enumerate().filter(|(_, s)| s.paths > 0) {
+                let cell = self.cell(more, column, vsl);
+                let own = cell.variance(scale);
+                sums.variances[column] += own;
+                variance += own;
+                sums.flux += cell.mean_watts(scale);
+            }
+            sums.errors += variance.sqrt();
+        }
+        sums
+    }
+}
+
+/// Sums over all virtual surface lights.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FluxErrors {
+    /// Variance of the flux in W², by column.
+    pub(crate) variances: Vec<f64>,
+    /// Standard errors, W.
+    errors: f64,
+    /// Mean channels of the flux, W.
+    flux: f64,
+}
+
+impl FluxErrors {
+    /// The relative standard error of a light's flux, in the mean over lights weighted by flux; 0 where there is no flux.
+    pub(crate) fn relative(&self) -> f64 {
+        if self.flux > 0.0 { self.errors / self.flux } else { 0.0 }
+    }
+}
+
+impl Cell {
+    /// Mean channel of its flux in W.
+    fn mean_watts(&self, scale: &ColumnScale) -> f64 {
+        let watts = scale.watts.as_dvec3();
+        let [r, g, b] = self.rgb.map(|sum| sum as f64 * QUANTUM / f64::from(scale.paths));
+        (watts * DVec3::new(r, g, b)).element_sum() / 3.0
+    }
+
+    /// Variance of the mean channel of its flux in W².
+    fn variance(&self, scale: &ColumnScale) -> f64 {
+        let paths = f64::from(scale.paths);
+        let [r, g, b] = self.rgb.map(|sum| sum as f64 * QUANTUM / paths);
+        let mean_channel = (r + g + b) / 3.0;
+        let mean_square = self.squares as f64 * (QUANTUM * QUANTUM * (1u64 << 26) as f64) / paths;
+        let mean_watts = scale.watts.as_dvec3().element_sum() / 3.0;
+        mean_watts * mean_watts * (mean_square - mean_channel * mean_channel).max(0.0) / paths
+    }
+}
+
+impl std::ops::Add for Cell {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            rgb: [0, 1, 2].map(|i| self.rgb[i] + other.rgb[i]),
+            squares: self.squares + other.squares,
+            count: self.count + other.count,
+            births_ms: self.births_ms + other.births_ms,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod apportion;
 pub mod bench;
+pub mod change;
 pub mod cli;
 pub mod counters;
 pub mod emitters;
@@ -13,9 +14,9 @@ pub mod owner;
 pub mod placement;
 pub mod pool;
 pub mod records;
-pub mod revision;
 pub mod service;
 pub mod simulation;
 mod streams;
 pub mod tracer;
+pub mod trail;
 pub mod vsl;

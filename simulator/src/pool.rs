@@ -1,11 +1,13 @@
 //! Keeps the paths behind the present flux, whole, so that replacing one takes back exactly what it gave.
 //!
 //! Source: paper A, Algorithm 2; deviates: a slot holds a whole path, not one impact, and the slot to refill is chosen by
-//! whoever traces: in a ring it is paper A's queue, the oldest path first.
+//! whoever traces: in a ring it is paper A's queue, the oldest path first. A path keeps the points it passed, too, so that
+//! a change of the scene is followed by tracing those again that met it.
 
 use crate::{
     flux::{Deposit, VslFlux},
     tracer::PathBatch,
+    trail::Vertex,
 };
 use glam::Vec3;
 
@@ -13,7 +15,8 @@ use glam::Vec3;
 #[derive(Clone, Debug)]
 pub struct PathPool {
     slots: Vec<Slot>,
-    deposits: Arena,
+    deposits: Arena<Deposit>,
+    vertices: Arena<Vertex>,
     /// The column of each run of slots, by the end of the run.
     columns: Vec<(u32, u32)>,
     /// Slots that hold a path, per column.
@@ -21,11 +24,11 @@ pub struct PathPool {
     flux: VslFlux,
 }
 
-/// One path: where its deposits are, and when it was traced.
+/// One path: where its deposits and its points are, and when it was traced.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slot {
-    start: usize,
-    length: u16,
+    deposits: Block,
+    vertices: Block,
     valid: bool,
     birth_ms: u32,
 }
@@ -39,6 +42,7 @@ impl PathPool {
         Self {
             slots: vec![Slot::default(); slots],
             deposits: Arena::default(),
+            vertices: Arena::default(),
             columns,
             valid: vec![0; count],
             flux: VslFlux::new(vsls, count),
@@ -47,50 +51,56 @@ impl PathPool {
 
     /// Replaces the paths of the batch's slots: takes back what the old ones deposited and adds what the new ones did.
     pub fn replace(&mut self, batch: &PathBatch, birth_ms: u32) {
-        let mut run = self.columns.partition_point(|&(end, _)| end <= batch.first_slot);
-        for (slot, deposits) in batch.paths() {
-            while self.columns[run].0 <= slot {
-                run += 1;
-            }
-            self.replace_path(slot, self.columns[run].1, deposits, birth_ms);
+        for path in batch.paths() {
+            self.put(path.slot, path.deposits, path.vertices, birth_ms);
         }
+    }
+
+    /// Puts a path into `slot`, in the place of the one that is there.
+    pub fn put(&mut self, slot: u32, deposits: &[Deposit], vertices: &[Vertex], birth_ms: u32) {
+        let column = self.column_of(slot);
+        self.take_back(slot, column);
+        self.slots[slot as usize] = Slot {
+            deposits: self.deposits.insert(deposits),
+            vertices: self.vertices.insert(vertices),
+            valid: true,
+            birth_ms,
+        };
+        self.valid[column as usize] += 1;
+        self.flux.add(column, deposits, birth_ms);
     }
 
     /// Takes back everything that the path in `slot` deposited and leaves the slot empty.
     pub fn remove(&mut self, slot: u32) {
-        let run = self.columns.partition_point(|&(end, _)| end <= slot);
-        self.take_back(slot, self.columns[run].1);
+        self.take_back(slot, self.column_of(slot));
     }
 
     /// Multiplies what the paths in `slots` deposited by `factor`, not negative: they then stand for as much more light.
     /// Rounded to quanta, and cut at the largest deposit.
     pub fn scale(&mut self, slots: std::ops::Range<u32>, factor: Vec3) {
-        let mut scaled = Vec::new();
         for slot in slots {
-            let Slot { start, length, valid, birth_ms } = self.slots[slot as usize];
+            let Slot { deposits, valid, birth_ms, .. } = self.slots[slot as usize];
             if !valid {
                 continue;
             }
-            scaled.clear();
-            scaled.extend(self.deposits.get(start, length).iter().filter_map(|d| d.scaled(factor)));
-            let run = self.columns.partition_point(|&(end, _)| end <= slot);
-            self.replace_path(slot, self.columns[run].1, &scaled, birth_ms);
+            let column = self.column_of(slot);
+            let deposits = self.deposits.get_mut(deposits);
+            self.flux.subtract(column, deposits, birth_ms);
+            deposits.iter_mut().for_each(|deposit| *deposit = deposit.scaled(factor));
+            self.flux.add(column, deposits, birth_ms);
         }
     }
 
-    fn replace_path(&mut self, slot: u32, column: u32, deposits: &[Deposit], birth_ms: u32) {
-        self.take_back(slot, column);
-        let start = self.deposits.insert(deposits);
-        self.slots[slot as usize] = Slot { start, length: deposits.len() as u16, valid: true, birth_ms };
-        self.valid[column as usize] += 1;
-        self.flux.add(column, deposits, birth_ms);
+    fn column_of(&self, slot: u32) -> u32 {
+        self.columns[self.columns.partition_point(|&(end, _)| end <= slot)].1
     }
 
     fn take_back(&mut self, slot: u32, column: u32) {
         let old = std::mem::take(&mut self.slots[slot as usize]);
         if old.valid {
-            self.flux.subtract(column, self.deposits.get(old.start, old.length), old.birth_ms);
-            self.deposits.remove(old.start, old.length);
+            self.flux.subtract(column, self.deposits.get(old.deposits), old.birth_ms);
+            self.deposits.remove(old.deposits);
+            self.vertices.remove(old.vertices);
             self.valid[column as usize] -= 1;
         }
     }
@@ -113,59 +123,85 @@ impl PathPool {
     /// The deposits of the path in `slot`; `None` where there is no path.
     pub fn path(&self, slot: u32) -> Option<&[Deposit]> {
         let slot = self.slots.get(slot as usize)?;
-        slot.valid.then(|| self.deposits.get(slot.start, slot.length))
+        slot.valid.then(|| self.deposits.get(slot.deposits))
+    }
+
+    /// The points that the path in `slot` passed; `None` where there is no path.
+    pub fn trail(&self, slot: u32) -> Option<&[Vertex]> {
+        let slot = self.slots.get(slot as usize)?;
+        slot.valid.then(|| self.vertices.get(slot.vertices))
+    }
+
+    /// When the path in `slot` was traced, in ms since the simulation started; `None` where there is no path.
+    pub fn birth_ms(&self, slot: u32) -> Option<u32> {
+        let slot = self.slots.get(slot as usize)?;
+        slot.valid.then_some(slot.birth_ms)
     }
 
     /// The flux summed anew from the pool's paths: always equal to [`PathPool::flux`], bit for bit.
     pub fn rebuilt_flux(&self) -> VslFlux {
         let mut flux = VslFlux::new(self.flux.vsls(), self.valid.len());
         for (index, slot) in self.slots.iter().enumerate().filter(|(_, slot)| slot.valid) {
-            let run = self.columns.partition_point(|&(end, _)| end <= index as u32);
-            flux.add(self.columns[run].1, self.deposits.get(slot.start, slot.length), slot.birth_ms);
+            flux.add(self.column_of(index as u32), self.deposits.get(slot.deposits), slot.birth_ms);
         }
         flux
     }
 
     /// Bytes the pool takes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.slots) + self.deposits.storage.capacity() * size_of::<Deposit>()
+        size_of_val(&*self.slots) + self.deposits.bytes() + self.vertices.bytes()
     }
 }
 
-/// Runs of deposits in blocks of a power of two, each size with a list of free blocks: replacing never moves others.
-#[derive(Clone, Debug, Default)]
-struct Arena {
-    storage: Vec<Deposit>,
-    free: [Vec<usize>; 14],
+/// Where a run of items lies in an arena.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    start: u32,
+    length: u16,
 }
 
-impl Arena {
-    fn insert(&mut self, deposits: &[Deposit]) -> usize {
-        if deposits.is_empty() {
-            return 0;
+/// Runs of items in blocks of a power of two, each size with a list of free blocks: replacing never moves others.
+#[derive(Clone, Debug, Default)]
+struct Arena<T> {
+    storage: Vec<T>,
+    free: [Vec<u32>; 15],
+}
+
+impl<T: Copy + Default> Arena<T> {
+    fn insert(&mut self, items: &[T]) -> Block {
+        if items.is_empty() {
+            return Block::default();
         }
-        let class = Self::class(deposits.len());
+        let class = Self::class(items.len());
         let start = self.free[class].pop().unwrap_or_else(|| {
             let start = self.storage.len();
-            self.storage.resize(start + (1 << class), Deposit { vsl: 0, rgb: [0; 3] });
-            start
+            self.storage.resize(start + (1 << class), T::default());
+            u32::try_from(start).expect("invariant: a pool's paths have fewer than 2^32 points")
         });
-        self.storage[start..start + deposits.len()].copy_from_slice(deposits);
-        start
+        self.storage[start as usize..start as usize + items.len()].copy_from_slice(items);
+        Block { start, length: items.len() as u16 }
     }
 
-    fn remove(&mut self, start: usize, length: u16) {
-        if length > 0 {
-            self.free[Self::class(usize::from(length))].push(start);
+    fn remove(&mut self, block: Block) {
+        if block.length > 0 {
+            self.free[Self::class(usize::from(block.length))].push(block.start);
         }
     }
 
-    fn get(&self, start: usize, length: u16) -> &[Deposit] {
-        &self.storage[start..start + usize::from(length)]
+    fn get(&self, block: Block) -> &[T] {
+        &self.storage[block.start as usize..][..usize::from(block.length)]
     }
 
-    /// The block size for `length` deposits, as a power of two.
+    fn get_mut(&mut self, block: Block) -> &mut [T] {
+        &mut self.storage[block.start as usize..][..usize::from(block.length)]
+    }
+
+    /// The block size for `length` items, as a power of two.
     fn class(length: usize) -> usize {
         length.next_power_of_two().trailing_zeros() as usize
+    }
+
+    fn bytes(&self) -> usize {
+        self.storage.capacity() * size_of::<T>()
     }
 }

@@ -2,8 +2,8 @@
 //! and whoever embeds the simulator.
 
 use crate::{
-    emitters::Emitters,
-    ledger::Ledger,
+    emitters::{Emitters, LightSlots},
+    ledger::{Ledger, PATHS_PER_TASK},
     owner::OwnerTable,
     placement::Placement,
     tracer::{PathBatch, Tracer, Wave},
@@ -52,6 +52,20 @@ impl Simulation {
         }
     }
 
+    /// Another scene in the place of this one, with lights placed anew. Where the lights and the size of the pool are the
+    /// same, the pool is split as before, so that no path is lost to another power.
+    pub fn reloaded(&self, scene: Arc<Scene>) -> Self {
+        let mut next = Self::new(scene);
+        let names = |scene: &Scene| scene.lights.iter().map(|light| light.name.clone()).collect::<Vec<_>>();
+        let (old, new) = (&self.scene, &next.scene);
+        if names(old) == names(new) && old.streaming.pool_paths == new.streaming.pool_paths {
+            let emitters = Arc::new(self.emitters.with_scene(new));
+            next.tracer = Tracer::new(Arc::clone(new), Arc::clone(&next.owners), Arc::clone(&emitters));
+            next.emitters = emitters;
+        }
+        next
+    }
+
     /// A ledger with an empty pool.
     pub fn ledger(&self) -> Ledger {
         Ledger::new(&self.scene, Arc::clone(&self.emitters), self.placement.vsls.len())
@@ -72,7 +86,7 @@ impl Simulation {
                 .par_iter()
                 .map_init(Wave::default, |wave, task| {
                     let mut batch = PathBatch::default();
-                    self.tracer.trace(task.first_slot, task.count, task.generation, wave, &mut batch);
+                    self.tracer.trace(&task.draws, wave, &mut batch);
                     batch
                 })
                 .collect();
@@ -85,17 +99,8 @@ impl Simulation {
     /// The ledger after every slot has been traced once.
     pub fn fill(&self) -> Ledger {
         let mut ledger = self.ledger();
-        let slots = u64::from(self.emitters.slots);
-        let runs: u64 = self
-            .emitters
-            .lights
-            .iter()
-            .map(|l| {
-                u64::from(l.slots.end - l.slots.start).div_ceil(u64::from(crate::ledger::PATHS_PER_TASK))
-            })
-            .sum();
-        debug_assert!(runs <= slots);
-        self.advance(&mut ledger, runs);
+        let tasks = |l: &LightSlots| u64::from((l.slots.end - l.slots.start).div_ceil(PATHS_PER_TASK));
+        self.advance(&mut ledger, self.emitters.lights.iter().map(tasks).sum());
         ledger
     }
 }

@@ -8,6 +8,7 @@ use crate::{
     emitters::{Emitters, LightSlots},
     flux::{Deposit, MAX_DEPOSITS, MAX_THROUGHPUT},
     owner::OwnerTable,
+    trail::Vertex,
 };
 use glam::Vec3;
 use photonstream_scene::{
@@ -43,15 +44,29 @@ struct Reflection {
     sides: Sides,
 }
 
-/// Finished paths of a run of slots, in their order.
+/// Which sample of its light a path takes: that of its slot, and which time round the slots of the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Draw {
+    /// The slot; all slots of a batch belong to one light.
+    pub slot: u32,
+    /// Slot i of a light with n slots takes sample i + `generation` · n: 0 always replays the same samples, counting it
+    /// up streams through the sequence.
+    pub generation: u32,
+}
+
+/// Finished paths, in the order in which they were asked for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathBatch {
-    /// The slot of the first path.
-    pub first_slot: u32,
+    /// The slot of each path.
+    pub slots: Vec<u32>,
     /// Number of deposits of each path.
     pub lengths: Vec<u16>,
     /// The deposits of all paths, one after another.
     pub deposits: Vec<Deposit>,
+    /// Number of points of each path.
+    pub point_counts: Vec<u16>,
+    /// The points of all paths, one after another.
+    pub vertices: Vec<Vertex>,
     /// What happened on the way.
     pub counters: Counters,
 }
@@ -59,20 +74,42 @@ pub struct PathBatch {
 impl PathBatch {
     /// Empties the batch, keeping its memory.
     pub fn clear(&mut self) {
+        self.slots.clear();
         self.lengths.clear();
         self.deposits.clear();
+        self.point_counts.clear();
+        self.vertices.clear();
         self.counters = Counters::default();
     }
 
-    /// Slot and deposits of each path.
-    pub fn paths(&self) -> impl Iterator<Item = (u32, &[Deposit])> {
-        let mut rest = self.deposits.as_slice();
-        self.lengths.iter().zip(self.first_slot..).map(move |(&length, slot)| {
-            let (path, tail) = rest.split_at(usize::from(length));
-            rest = tail;
-            (slot, path)
-        })
+    /// Each path.
+    pub fn paths(&self) -> impl Iterator<Item = Path<'_>> {
+        let (mut deposits, mut vertices) = (self.deposits.as_slice(), self.vertices.as_slice());
+        self.slots.iter().zip(&self.lengths).zip(&self.point_counts).map(
+            move |((&slot, &length), &points)| Path {
+                slot,
+                deposits: take(&mut deposits, length),
+                vertices: take(&mut vertices, points),
+            },
+        )
     }
+}
+
+fn take<'a, T>(rest: &mut &'a [T], count: u16) -> &'a [T] {
+    let (first, tail) = rest.split_at(usize::from(count));
+    *rest = tail;
+    first
+}
+
+/// A finished path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Path<'a> {
+    /// Its slot.
+    pub slot: u32,
+    /// What it left on its way.
+    pub deposits: &'a [Deposit],
+    /// The points it passed; none where its light sent nothing.
+    pub vertices: &'a [Vertex],
 }
 
 /// Sees what a tracer does; `()` sees nothing and costs nothing.
@@ -104,19 +141,10 @@ impl Tracer {
         Self { geometry: Arc::clone(&scene.geometry), scene, owners, emitters, surfaces }
     }
 
-    /// Traces `count` slots from `first_slot`; slot i of a light takes sample i + `generation` · (slots of the light).
-    ///
-    /// Generation 0 always replays the same samples; counting it up streams through the sequence. All slots of a batch
-    /// must belong to one light. `wave` is memory to work with; what it held before does not matter.
-    pub fn trace(
-        &self,
-        first_slot: u32,
-        count: u32,
-        generation: u64,
-        wave: &mut Wave,
-        batch: &mut PathBatch,
-    ) {
-        self.trace_watched(first_slot, count, generation, wave, batch, &mut ());
+    /// Traces the paths of `draws`, whose slots belong to one light. `wave` is memory to work with; what it held before
+    /// does not matter.
+    pub fn trace(&self, draws: &[Draw], wave: &mut Wave, batch: &mut PathBatch) {
+        self.trace_watched(draws, wave, batch, &mut ());
     }
 
     /// [`Tracer::trace`], with every ray and hit shown to `watcher`.
@@ -126,21 +154,18 @@ impl Tracer {
     /// instruction.
     pub(crate) fn trace_watched(
         &self,
-        first_slot: u32,
-        count: u32,
-        generation: u64,
+        draws: &[Draw],
         wave: &mut Wave,
         batch: &mut PathBatch,
         watcher: &mut impl Watcher,
     ) {
         batch.clear();
-        batch.first_slot = first_slot;
-        batch.counters.paths += u64::from(count);
-        let light = self.emitters.light_of(first_slot);
-        debug_assert!(first_slot + count <= light.slots.end, "a batch belongs to one light");
-        let first_sample = generation * u64::from(light.slots.end - light.slots.start)
-            + u64::from(first_slot - light.slots.start);
-        self.emit(light, first_sample, count, wave);
+        let Some(first) = draws.first() else { return };
+        batch.slots.extend(draws.iter().map(|draw| draw.slot));
+        batch.counters.paths += draws.len() as u64;
+        let light = self.emitters.light_of(first.slot);
+        debug_assert!(draws.iter().all(|d| light.slots.contains(&d.slot)), "a batch belongs to one light");
+        self.emit(light, draws, wave);
         for _ in 0..MAX_DEPOSITS {
             if wave.photons.is_empty() {
                 break;
@@ -148,17 +173,22 @@ impl Tracer {
             self.advance(wave, &mut batch.counters, watcher);
         }
         batch.counters.truncated += wave.photons.len() as u64;
-        wave.collect(count, batch);
+        wave.collect(draws.len(), batch);
     }
 
     /// Fills the wave with the photons that leave the light.
-    fn emit(&self, light: &LightSlots, first_sample: u64, count: u32, wave: &mut Wave) {
+    fn emit(&self, light: &LightSlots, draws: &[Draw], wave: &mut Wave) {
         wave.photons.clear();
         wave.events.clear();
+        wave.points.clear();
         let shape = &self.scene.lights[light.light.0 as usize].light.shape;
         let mut samples = std::mem::take(&mut wave.spare_samples);
         samples.restart(0);
-        (0..count).for_each(|path| samples.push(light.sequence.sample(first_sample + u64::from(path))));
+        let count = u64::from(light.slots.end - light.slots.start);
+        for draw in draws {
+            let index = u64::from(draw.generation) * count + u64::from(draw.slot - light.slots.start);
+            samples.push(light.sequence.sample(index));
+        }
         samples.next_2d(&mut wave.first, &mut wave.second);
         // Only area lights start photons from a place that is sampled, too.
         let area = !shape.is_delta();
@@ -168,7 +198,7 @@ impl Tracer {
             samples.skip_dimension();
         }
         wave.samples.restart(samples.dimension());
-        for path in 0..count {
+        for path in 0..draws.len() as u32 {
             let i = path as usize;
             let u_position = if area { [wave.directions.x[i], wave.directions.y[i]] } else { [0.0; 2] };
             let emission = shape.emit_with(self.scene.bounds, [wave.first[i], wave.second[i]], u_position);
@@ -177,6 +207,7 @@ impl Tracer {
                 let ray =
                     Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
                 wave.photons.push(Photon { path, throughput, ray });
+                wave.points.push((path, Vertex::emitted(ray.origin)));
                 wave.samples.push(samples.get(i));
             }
         }
@@ -199,9 +230,14 @@ impl Tracer {
         surviving_samples.restart(wave.samples.dimension());
         for i in 0..wave.photons.len() {
             let (photon, roulette) = (wave.photons[i], wave.first[i]);
-            let Some((next, normal)) =
-                self.reflect(&photon, &wave.hits[i], roulette, &mut wave.events, counters, watcher)
-            else {
+            let Some((next, normal)) = self.reflect(
+                &photon,
+                &wave.hits[i],
+                roulette,
+                (&mut wave.events, &mut wave.points),
+                counters,
+                watcher,
+            ) else {
                 continue;
             };
             wave.photons[survivors] = next;
@@ -227,7 +263,7 @@ impl Tracer {
         photon: &Photon,
         hit: &Option<Hit>,
         roulette: f32,
-        events: &mut Vec<(u32, Deposit)>,
+        (events, points): (&mut Vec<(u32, Deposit)>, &mut Vec<(u32, Vertex)>),
         counters: &mut Counters,
         watcher: &mut impl Watcher,
     ) -> Option<(Photon, Vec3)> {
@@ -235,6 +271,7 @@ impl Tracer {
             // A ray that is not finite hits nothing. One sum instead of nine tests: it is finite unless a part is not.
             if (photon.ray.origin + photon.ray.direction + photon.throughput).is_finite() {
                 counters.escaped += 1;
+                points.push((photon.path, Vertex::escaped(photon.ray.direction)));
             } else {
                 counters.rejected += 1;
             }
@@ -242,9 +279,15 @@ impl Tracer {
         };
         let front = self.geometry.normals[hit.triangle as usize];
         let side = if front.dot(photon.ray.direction) < 0.0 { Side::Front } else { Side::Back };
+        let vertices = self.geometry.triangle(hit.triangle);
+        let point = surface::point(vertices, hit.u, hit.v);
+        let mut arrive = |deposited| {
+            points.push((photon.path, Vertex::hit(point, [hit.u, hit.v], hit.triangle, side, deposited)));
+        };
         let reflection = self.surfaces[self.geometry.object_of[hit.triangle as usize].0 as usize];
         if !reflection.sides.contains(side) {
             counters.absorbed_back += 1;
+            arrive(false);
             return None;
         }
         let throughput = photon.throughput * reflection.albedo;
@@ -253,9 +296,12 @@ impl Tracer {
             self.owners.owner(hit.triangle, side, hit.u, hit.v).filter(|_| throughput.is_finite())
         else {
             counters.rejected += 1;
+            arrive(false);
             return None;
         };
-        events.extend(Deposit::new(owner.0, throughput).map(|deposit| (photon.path, deposit)));
+        let deposit = Deposit::new(owner.0, throughput);
+        arrive(deposit.is_some());
+        events.extend(deposit.map(|deposit| (photon.path, deposit)));
         if roulette >= reflection.survival {
             return None;
         }
@@ -265,8 +311,7 @@ impl Tracer {
             return None;
         }
         let normal = front * side.sign();
-        let vertices = self.geometry.triangle(hit.triangle);
-        let origin = surface::offset(vertices, surface::point(vertices, hit.u, hit.v), normal);
+        let origin = surface::offset(vertices, point, normal);
         // The direction follows for all photons at once.
         let ray = Ray { origin, direction: Vec3::ZERO, t_max: f32::INFINITY };
         Some((Photon { path: photon.path, throughput, ray }, normal))
@@ -296,29 +341,44 @@ pub struct Wave {
     directions: Vectors,
     /// Deposits of all paths as they happened.
     events: Vec<(u32, Deposit)>,
+    /// Points of all paths as they were passed.
+    points: Vec<(u32, Vertex)>,
     /// Where each path's deposits go next.
     places: Vec<u32>,
 }
 
 impl Wave {
-    /// Sorts the deposits by path, each path's in their order, into the batch.
-    fn collect(&mut self, count: u32, batch: &mut PathBatch) {
-        batch.lengths.resize(count as usize, 0);
-        for &(path, _) in &self.events {
-            batch.lengths[path as usize] += 1;
-        }
-        self.places.clear();
-        self.places.extend(batch.lengths.iter().scan(0, |end, &length| {
-            let start = *end;
-            *end += u32::from(length);
-            Some(start)
-        }));
-        batch.deposits.resize(self.events.len(), Deposit { vsl: 0, rgb: [0; 3] });
-        for &(path, deposit) in &self.events {
-            let place = &mut self.places[path as usize];
-            batch.deposits[*place as usize] = deposit;
-            *place += 1;
-        }
+    /// Sorts deposits and points by path, each path's in their order, into the batch.
+    fn collect(&mut self, count: usize, batch: &mut PathBatch) {
+        sort_by_path(count, &self.events, &mut self.places, &mut batch.lengths, &mut batch.deposits);
+        sort_by_path(count, &self.points, &mut self.places, &mut batch.point_counts, &mut batch.vertices);
         batch.counters.deposits += self.events.len() as u64;
+    }
+}
+
+/// Sorts `found` by path into `sorted`, and counts how many each path has.
+fn sort_by_path<T: Copy + Default>(
+    paths: usize,
+    found: &[(u32, T)],
+    places: &mut Vec<u32>,
+    counts: &mut Vec<u16>,
+    sorted: &mut Vec<T>,
+) {
+    counts.clear();
+    counts.resize(paths, 0);
+    for &(path, _) in found {
+        counts[path as usize] += 1;
+    }
+    places.clear();
+    places.extend(counts.iter().scan(0, |end, &count| {
+        let start = *end;
+        *end += u32::from(count);
+        Some(start)
+    }));
+    sorted.resize(found.len(), T::default());
+    for &(path, item) in found {
+        let place = &mut places[path as usize];
+        sorted[*place as usize] = item;
+        *place += 1;
     }
 }

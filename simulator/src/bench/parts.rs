@@ -94,14 +94,7 @@ impl Recording {
             .iter()
             .map(|task| {
                 let mut batch = PathBatch::default();
-                simulation.tracer.trace_watched(
-                    task.first_slot,
-                    task.count,
-                    0,
-                    &mut wave,
-                    &mut batch,
-                    &mut recorder,
-                );
+                simulation.tracer.trace_watched(&task.draws, &mut wave, &mut batch, &mut recorder);
                 batch
             })
             .collect();
@@ -136,7 +129,7 @@ impl Recording {
         let (mut wave, mut batch) = (Wave::default(), PathBatch::default());
         let tracer_ns = timed(&mut || {
             for task in &self.tasks {
-                simulation.tracer.trace(task.first_slot, task.count, task.generation, &mut wave, &mut batch);
+                simulation.tracer.trace(&task.draws, &mut wave, &mut batch);
                 black_box(&batch);
             }
         });

@@ -5,10 +5,10 @@ use super::{
     tracer_actor::Work,
 };
 use crate::{
+    change::Change as SceneChange,
     counters::Counters,
     ledger::{Ledger, Task},
     records,
-    revision::revisions,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
 };
@@ -194,7 +194,7 @@ impl LedgerActor {
                 false => progress.ledger.next_task(),
             };
             let Some(task) = task else { break };
-            progress.paths_given += u64::from(task.count);
+            progress.paths_given += task.draws.len() as u64;
             let batch = progress.spare.pop().unwrap_or_default();
             let tracer = Arc::clone(&progress.tracer);
             if self.work.send(Work { tracer, task, batch }).is_err() {
@@ -321,8 +321,8 @@ impl Progress {
     fn edit(&mut self, version: Version) {
         let Version { simulation, still, received_ns } = version;
         self.places += u64::from(!Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry));
-        let revisions = revisions(&self.simulation, &simulation);
-        self.ledger.revise(Arc::clone(&simulation.emitters), &revisions);
+        let change = SceneChange::between(&self.simulation, &simulation);
+        self.ledger.revise(&simulation, change, None);
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;
         self.still = still;

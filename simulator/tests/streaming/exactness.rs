@@ -21,9 +21,9 @@ impl Random {
 
     /// A batch of one to four paths of zero to eleven deposits; `decades` scales their size down by up to as many.
     fn batch(&mut self, slots: u32, vsls: u32, decades: u32) -> PathBatch {
-        let mut batch =
-            PathBatch { first_slot: (self.next() % u64::from(slots - 4)) as u32, ..PathBatch::default() };
-        for _ in 0..=self.next() % 4 {
+        let mut batch = PathBatch::default();
+        let first = (self.next() % u64::from(slots - 4)) as u32;
+        for slot in first..=first + (self.next() % 4) as u32 {
             let length = self.next() % 12;
             for _ in 0..length {
                 let bits = self.next();
@@ -31,7 +31,9 @@ impl Random {
                 let rgb = [bits, bits >> 20, bits >> 40].map(|b| (b as i32 & 0x3FF_FFFF) / scale);
                 batch.deposits.push(Deposit { vsl: (bits >> 32) as u32 % vsls, rgb });
             }
+            batch.slots.push(slot);
             batch.lengths.push(length as u16);
+            batch.point_counts.push(0);
         }
         batch
     }

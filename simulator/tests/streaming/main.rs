@@ -4,6 +4,7 @@ mod closed_forms;
 mod edits;
 mod exactness;
 mod placed;
+mod selective;
 mod service;
 mod service_edits;
 mod support;

@@ -5,6 +5,7 @@ use photonstream_protocol::{
     AccessMode, ChannelName, ControlClient, Liveness, Reading, Reply, Request, Subscriber, VslFrame,
 };
 use photonstream_simulator::{
+    ledger::Ledger,
     service::{self, Ending, Options, Summary},
     simulation::Simulation,
     tracer::Tracer,
@@ -87,13 +88,12 @@ fn frames_hold_the_same_flux_on_any_number_of_threads() {
         let mut ledger = simulation.ledger();
         let tasks = paths.map_or(u64::MAX, |_| {
             // As many tasks as hold the paths: the last of each round is short.
-            let (mut given, mut tasks) = (0, 0);
             let mut counting = simulation.ledger();
-            while given < paths.unwrap() {
-                given += u64::from(counting.next_task().unwrap().count);
-                tasks += 1;
-            }
-            tasks
+            let more = |ledger: &mut Ledger| {
+                simulation.advance(ledger, 1);
+                ledger.counters().paths < paths.unwrap()
+            };
+            1 + std::iter::from_fn(|| more(&mut counting).then_some(())).count() as u64
         });
         simulation.advance(&mut ledger, tasks);
         let expected: Vec<[f32; 3]> = ledger.readings(&simulation.scene).map(|r| r.flux.to_array()).collect();

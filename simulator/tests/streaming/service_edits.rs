@@ -211,12 +211,14 @@ fn edits_meet_pauses_and_limits() {
     let request = move_object("ball", json!({ "position_m": [0.2, 0, 0] }));
     let Reply::Ok { frame: number } = client.request(&request, PATIENCE).unwrap() else { panic!() };
     let frame = frame_where(&mut subscriber, number, |_| (), |_| true);
-    assert_eq!((frame.statistics.stale_share, frame.statistics.converged), (1.0, 0));
+    let stale = frame.statistics.stale_share;
+    assert!(stale > 0.0 && stale < 1.0 && frame.statistics.converged == 0, "{stale}");
     assert!(matches!(client.request(&Request::Resume, PATIENCE).unwrap(), Reply::Ok { .. }));
     let after = frame_where(&mut subscriber, number, |_| (), is_converged);
-    // Each slot again, once.
+    // Each stale slot again, once; a path of fresh samples that was valid is not replaced beyond the limit.
     let paths = after.statistics.paths_total - frame.statistics.paths_total;
-    assert_eq!((after.statistics.stale_share, paths), (0.0, after.statistics.pool_paths));
+    let slots = after.statistics.pool_paths as f64;
+    assert_eq!((after.statistics.stale_share, paths as f64), (0.0, (stale * slots).round()));
     end(service);
 }
 

@@ -1,0 +1,132 @@
+//! Turns two versions of a scene into what the step from one to the other means for the paths of each light.
+
+use crate::{
+    simulation::Simulation,
+    trail::{Disturbance, Obstacle, Vertex},
+};
+use glam::Vec3;
+use photonstream_scene::{Object, Scene, Side};
+use photonstream_shading::LightShape;
+use std::sync::Arc;
+
+/// What a new version of the scene means for the paths of one light, wherever they went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightRevision {
+    /// Its paths stand for the old version and have to be traced again.
+    pub stale: bool,
+    /// What its old deposits are multiplied by to stand for the same light in the new version's units until then.
+    pub factor: Vec3,
+}
+
+impl LightRevision {
+    /// Nothing to do.
+    pub const NONE: Self = Self { stale: false, factor: Vec3::ONE };
+}
+
+/// What a new version of the scene means for the paths of the old one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// For all paths of each light, in the lights' order.
+    pub lights: Vec<LightRevision>,
+    /// For the paths that met something.
+    disturbance: Disturbance,
+}
+
+impl Change {
+    /// From `old` to `new`, a version of it: [`Simulation::with_scene`].
+    ///
+    /// A moved light makes its own paths stale; a moved object or a changed material those that met it. The power of a
+    /// light with a column of its own is a factor of that column: no path is stale. In a shared column it weighs the
+    /// light's paths against those of the others.
+    pub fn between(old: &Simulation, new: &Simulation) -> Self {
+        Self { lights: light_revisions(old, new), disturbance: disturbance(&old.scene, &new.scene) }
+    }
+
+    /// Whether the path of a light through `vertices` may be another one in the new version.
+    #[inline]
+    pub fn concerns(&self, light: usize, vertices: &[Vertex]) -> bool {
+        self.lights[light].stale || self.disturbance.concerns(vertices)
+    }
+
+    /// Whether any path of `light` may be concerned.
+    pub fn may_concern(&self, light: usize) -> bool {
+        self.lights[light].stale || !self.disturbance.is_empty()
+    }
+}
+
+fn light_revisions(old: &Simulation, new: &Simulation) -> Vec<LightRevision> {
+    let has_other_bounds = old.scene.bounds != new.scene.bounds;
+    let lights = old.scene.lights.iter().zip(&new.scene.lights);
+    let slots = old.emitters.lights.iter().zip(&new.emitters.lights);
+    lights
+        .zip(slots)
+        .map(|((old, new), (old_slots, new_slots))| {
+            let weighed_anew = old_slots.birth != new_slots.birth;
+            // The beam of a sun covers the whole scene.
+            let is_sun = matches!(new.light.shape, LightShape::Directional { .. });
+            let is_elsewhere = old.light.shape != new.light.shape || (is_sun && has_other_bounds);
+            let watts = if old_slots.watts_per_power == new_slots.watts_per_power {
+                1.0
+            } else {
+                old_slots.watts_per_power / new_slots.watts_per_power
+            };
+            let ratio = |old: f32, new: f32| match (old, new) {
+                (old, new) if old == new => 1.0,
+                (0.0, _) => 0.0,
+                (old, new) => new / old,
+            };
+            let [r, g, b] = [0, 1, 2].map(|i| ratio(old_slots.birth[i], new_slots.birth[i]));
+            LightRevision { stale: is_elsewhere || weighed_anew, factor: Vec3::new(r, g, b) * watts }
+        })
+        .collect()
+}
+
+/// What has changed on the way of paths, where objects and triangles are the same in both versions.
+fn disturbance(old: &Scene, new: &Scene) -> Disturbance {
+    let is_still = Arc::ptr_eq(&old.geometry, &new.geometry);
+    let mut reach = 0.0;
+    let (mut touched, mut obstacles) = (Vec::new(), Vec::new());
+    for (before, after) in old.objects.iter().zip(&new.objects) {
+        let has_moved = !is_still && before.world_from_rest != after.world_from_rest;
+        if has_moved {
+            if reach == 0.0 {
+                reach = reach_of(old).max(reach_of(new));
+            }
+            obstacles.extend(obstacle(new, after, reach));
+        }
+        if has_moved || !reflects_alike(old, before, new, after) {
+            touched.push(after.triangles.clone());
+        }
+    }
+    Disturbance::new(touched, obstacles)
+}
+
+/// Whether a path that hits an object is reflected as it was in another version.
+pub(crate) fn reflects_alike(old: &Scene, before: &Object, new: &Scene, after: &Object) -> bool {
+    let albedo = |scene: &Scene, object: &Object| scene.materials[object.material.0 as usize].albedo;
+    let sides = |object: &Object| [Side::Front, Side::Back].map(|side| object.sides.contains(side));
+    albedo(old, before) == albedo(new, after) && sides(before) == sides(after)
+}
+
+/// The box around an object; `None` for one without triangles.
+pub(crate) fn obstacle(scene: &Scene, object: &Object, reach: f32) -> Option<Obstacle> {
+    let mut corners = object.triangles.clone().flat_map(|t| scene.geometry.triangle(t));
+    let first = corners.next()?;
+    let (low, high) = corners.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+    Some(Obstacle::new(low, high, reach))
+}
+
+/// No coordinate of a path's points is larger.
+pub(crate) fn reach_of(scene: &Scene) -> f32 {
+    // The beam of a sun starts on a disc beside the scene's sphere.
+    let around = scene.bounds.centre.abs().max_element() + 3.0 * scene.bounds.radius;
+    let position = |shape: &LightShape| match *shape {
+        LightShape::Point { position } | LightShape::Spot { position, .. } => position.abs().max_element(),
+        LightShape::Directional { .. } => 0.0,
+        LightShape::Parallelogram { corner, edge_u, edge_v }
+        | LightShape::Triangle { corner, edge_u, edge_v } => {
+            corner.abs().max_element() + edge_u.length() + edge_v.length()
+        }
+    };
+    scene.lights.iter().map(|light| position(&light.light.shape)).fold(around, f32::max)
+}

@@ -1,0 +1,242 @@
+//! Turns the pool of one scene into that of another: paths that the step does not concern are kept, their deposits given to
+//! whoever owns them now.
+//!
+//! Objects and lights are recognised by their names. What is equal is equal to the last bit: objects have the same
+//! vertices in the scene's space, lights the same samples. The order of triangles among kept objects is that of their
+//! names in both scenes, so that rays that hit two of them at one distance keep their hit.
+
+use super::{FILLED, Ledger, STALE, UNDER_WAY, rays};
+use crate::{
+    change::{LightRevision, obstacle, reach_of, reflects_alike},
+    flux::Deposit,
+    simulation::Simulation,
+    trail::{Disturbance, Event, Vertex},
+};
+use glam::Vec3;
+use photonstream_scene::{Object, Scene};
+use photonstream_shading::LightShape;
+
+/// What the step from one scene to any other means for the paths of the old one.
+#[derive(Clone, Debug)]
+pub struct Migration {
+    /// For each light of the new scene its number in the old one, and what becomes of its paths.
+    lights: Vec<Option<(usize, LightRevision)>>,
+    /// For each triangle of the old scene its number in the new one.
+    triangles: Vec<u32>,
+    /// In the old scene's triangles, and the space that both share.
+    disturbance: Disturbance,
+    /// The lights are the old ones in the same order: their patches are numbered alike.
+    same_owners: bool,
+}
+
+/// The triangle is in the old scene alone.
+const GONE: u32 = u32::MAX;
+
+impl Migration {
+    /// From `old` to `new`, which need have nothing in common.
+    pub fn between(old: &Simulation, new: &Simulation) -> Self {
+        let (before, after) = (&*old.scene, &*new.scene);
+        let is_elsewhere = before.origin_m != after.origin_m;
+        let has_other_samples = before.streaming.seed != after.streaming.seed
+            || before.streaming.sampling != after.streaming.sampling;
+        let all_stale = is_elsewhere || has_other_samples;
+        let (triangles, disturbance) = objects(before, after);
+        let lights = after
+            .lights
+            .iter()
+            .zip(&new.emitters.lights)
+            .map(|(light, slots)| {
+                let index = before.light(&light.name)?.0 as usize;
+                let (old_light, old_slots) = (&before.lights[index], &old.emitters.lights[index]);
+                let is_sun = matches!(light.light.shape, LightShape::Directional { .. });
+                let count = |slots: &std::ops::Range<u32>| slots.end - slots.start;
+                let is_moved = old_light.light.shape != light.light.shape
+                    || (is_sun && before.bounds != after.bounds)
+                    // Of a stream later samples are numbered by the light's slots.
+                    || (count(&old_slots.slots) != count(&slots.slots) && !matches!(after.streaming.sampling, photonstream_scene::Sampling::Replay));
+                let is_alone = |simulation: &Simulation, column: u32| {
+                    simulation.emitters.columns[column as usize].shared_watts.is_none()
+                };
+                let both_alone = is_alone(old, old_slots.column) && is_alone(new, slots.column);
+                // Watts that a path stands for, times the paths: units of shared columns differ.
+                let factor = if both_alone && old_slots.watts_per_power == slots.watts_per_power {
+                    Vec3::ONE
+                } else {
+                    unit_factor(old, index, new, light.light.power, slots)
+                };
+                Some((index, LightRevision { stale: all_stale || is_moved || factor != Vec3::ONE, factor }))
+            })
+            .collect();
+        let same_owners = old.placement == new.placement && triangles.iter().zip(0..).all(|(&t, i)| t == i);
+        Self { lights, triangles, disturbance, same_owners }
+    }
+}
+
+/// What old deposits of a light are multiplied by so that they stand for the same light, about, in the new scene's units.
+fn unit_factor(
+    old: &Simulation,
+    index: usize,
+    new: &Simulation,
+    power: Vec3,
+    slots: &crate::emitters::LightSlots,
+) -> Vec3 {
+    let unit = |simulation: &Simulation, slots: &crate::emitters::LightSlots, power: Vec3| {
+        let column = &simulation.emitters.columns[slots.column as usize];
+        let own = f64::from(slots.slots.end - slots.slots.start) / f64::from(column.slots.max(1));
+        let watts = column.shared_watts.map_or(power * slots.watts_per_power, Vec3::splat);
+        // A deposit of throughput 1 counts so many watts, as one of the column's paths.
+        watts * own as f32
+    };
+    let old_slots = &old.emitters.lights[index];
+    let (before, after) =
+        (unit(old, old_slots, old.scene.lights[index].light.power), unit(new, slots, power));
+    let ratio = |before: f32, after: f32| {
+        if after > 0.0 && before.is_finite() { (before / after).min(1e6) } else { 0.0 }
+    };
+    Vec3::new(ratio(before.x, after.x), ratio(before.y, after.y), ratio(before.z, after.z))
+}
+
+/// Where each old triangle is now, and what has changed on the way of paths.
+fn objects(before: &Scene, after: &Scene) -> (Vec<u32>, Disturbance) {
+    let mut triangles = vec![GONE; before.geometry.triangles.len()];
+    let (mut touched, mut obstacles) = (Vec::new(), Vec::new());
+    let reach = reach_of(before).max(reach_of(after));
+    for object in &before.objects {
+        let other = after.object(&object.name).map(|id| &after.objects[id.0 as usize]);
+        let is_same_mesh = other.is_some_and(|other| has_same_mesh(before, object, after, other));
+        if let Some(other) = other.filter(|_| is_same_mesh) {
+            for (old, new) in object.triangles.clone().zip(other.triangles.clone()) {
+                triangles[old as usize] = new;
+            }
+        }
+        let is_kept = other.filter(|_| is_same_mesh).is_some_and(|other| {
+            stands_alike(before, object, after, other) && reflects_alike(before, object, after, other)
+        });
+        if !is_kept {
+            touched.push(object.triangles.clone());
+        }
+    }
+    for object in &after.objects {
+        let other = before.object(&object.name).map(|id| &before.objects[id.0 as usize]);
+        let was_there = other.is_some_and(|other| {
+            has_same_mesh(before, other, after, object) && stands_alike(before, other, after, object)
+        });
+        if !was_there {
+            obstacles.extend(obstacle(after, object, reach));
+        }
+    }
+    (triangles, Disturbance::new(touched, obstacles))
+}
+
+fn has_same_mesh(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bool {
+    old.triangles.len() == new.triangles.len()
+        && old
+            .triangles
+            .clone()
+            .zip(new.triangles.clone())
+            .all(|(a, b)| before.geometry.rest_triangle(a) == after.geometry.rest_triangle(b))
+}
+
+fn stands_alike(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bool {
+    old.triangles
+        .clone()
+        .zip(new.triangles.clone())
+        .all(|(a, b)| before.geometry.triangle(a) == after.geometry.triangle(b))
+}
+
+impl Ledger {
+    /// The ledger of another scene, with the paths of this one that `migration` leaves. Tasks under way are dropped when
+    /// they come.
+    pub fn migrate(self, migration: &Migration, simulation: &Simulation) -> Self {
+        let mut next = simulation.ledger();
+        next.version = self.version + 1;
+        next.structure = self.structure + 1;
+        next.units.fill(next.version);
+        (next.counters, next.savings) = (self.counters, self.savings);
+        let is_replay = next.given.is_empty();
+        let mut moved = Moved::default();
+        for (index, source) in migration.lights.iter().enumerate() {
+            let Some((old_index, revision)) = source else { continue };
+            let old_light = &self.emitters.lights[*old_index];
+            let new_slots = next.emitters.lights[index].slots.clone();
+            for (old_slot, slot) in
+                (old_light.slots.start..old_light.slots.start + self.active[*old_index]).zip(new_slots)
+            {
+                let mark = self.slots[old_slot as usize];
+                let (Some(deposits), Some(vertices)) = (self.pool.path(old_slot), self.pool.trail(old_slot))
+                else {
+                    continue;
+                };
+                let is_stale =
+                    mark & STALE != 0 || revision.stale || migration.disturbance.concerns(vertices);
+                moved.take(migration, simulation, deposits, vertices, revision.factor);
+                let birth_ms = self.pool.birth_ms(old_slot).unwrap_or_default();
+                next.pool.put(slot, &moved.deposits, &moved.vertices, birth_ms);
+                next.slots[slot as usize] = FILLED | if is_stale { STALE } else { 0 };
+                debug_assert!(next.slots[slot as usize] & UNDER_WAY == 0);
+                next.empty -= 1;
+                next.stale_paths += u32::from(is_stale);
+                if is_stale {
+                    next.savings.retraced_paths += u64::from(mark & STALE == 0);
+                } else {
+                    next.savings.rays_saved += rays(&self.pool, old_slot);
+                }
+                if !is_replay {
+                    next.given[slot as usize] = self.given.get(old_slot as usize).copied().unwrap_or(1);
+                }
+            }
+        }
+        next.queue_open_slots();
+        next
+    }
+}
+
+/// A path in the terms of another scene.
+#[derive(Default)]
+struct Moved {
+    deposits: Vec<Deposit>,
+    vertices: Vec<Vertex>,
+}
+
+impl Moved {
+    fn take(
+        &mut self,
+        migration: &Migration,
+        simulation: &Simulation,
+        deposits: &[Deposit],
+        vertices: &[Vertex],
+        factor: Vec3,
+    ) {
+        self.deposits.clear();
+        self.vertices.clear();
+        let mut rest = deposits.iter();
+        for vertex in vertices {
+            let Event::Hit { triangle, side, deposited } = vertex.event() else {
+                self.vertices.push(*vertex);
+                continue;
+            };
+            let deposit = if deposited { rest.next() } else { None };
+            let number = migration.triangles[triangle as usize];
+            // Light on what is gone is gone; the path is stale then.
+            if number == GONE {
+                continue;
+            }
+            let Some(deposit) = deposit else {
+                self.vertices.push(vertex.renumbered(number));
+                continue;
+            };
+            let [u, v] = vertex.uv;
+            let owner = if migration.same_owners {
+                deposit.vsl
+            } else {
+                match simulation.owners.owner(number, side, u, v) {
+                    Some(owner) => owner.0,
+                    None => continue,
+                }
+            };
+            let deposit = Deposit { vsl: owner, ..*deposit };
+            self.deposits.push(if factor == Vec3::ONE { deposit } else { deposit.scaled(factor) });
+            self.vertices.push(vertex.renumbered(number));
+        }
+    }
+}

@@ -1,0 +1,511 @@
+//! Turns finished batches into flux: the single writer of the pool, and the one who says which slots to trace next.
+//!
+//! Batches are applied in the order in which their tasks were given out, whoever finishes first, so that pool and flux
+//! after n tasks are the same on any number of threads.
+//!
+//! A new version of the scene makes stale the paths that met what has changed, and no others: they stay until their slots
+//! are traced again, the brightest first, so that light changes gradually and never goes out. A batch that was under way
+//! in an older version is taken in too, and judged in the same way when it comes.
+
+mod migration;
+mod queue;
+mod refinement;
+
+pub use migration::Migration;
+
+use crate::{
+    change::Change,
+    counters::Counters,
+    emitters::Emitters,
+    flux::{ColumnScale, FluxReading},
+    pool::PathPool,
+    simulation::Simulation,
+    tracer::{Draw, PathBatch},
+};
+use glam::Vec3;
+use photonstream_scene::{Sampling, Scene};
+use queue::{Queue, Ring};
+use rayon::prelude::*;
+use refinement::Refinement;
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::Arc,
+};
+
+/// Paths in one task: enough to make handing it over cheap, few enough to share the work evenly.
+pub const PATHS_PER_TASK: u32 = 512;
+
+/// A light's part of the pool is never made smaller than this for the sake of speed.
+const LEAST_ACTIVE: u32 = 256;
+
+/// Slots to be traced.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Place in the order of all tasks.
+    pub number: u64,
+    /// The paths; their slots belong to one light.
+    pub draws: Vec<Draw>,
+    /// The version of the scene to trace them in: counts the changes of the ledger.
+    pub version: u64,
+    light: usize,
+    beyond_pool: bool,
+    structure: u64,
+}
+
+/// What edits cost and what they did not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Savings {
+    /// Rays of paths that stayed valid through a change of objects, materials or lights.
+    pub rays_saved: u64,
+    /// Paths that such changes made stale.
+    pub retraced_paths: u64,
+}
+
+const FILLED: u8 = 1;
+const STALE: u8 = 2;
+const UNDER_WAY: u8 = 4;
+
+/// Owns pool and flux.
+#[derive(Debug)]
+pub struct Ledger {
+    emitters: Arc<Emitters>,
+    sampling: Sampling,
+    pool: PathPool,
+    /// What is known of each slot.
+    slots: Vec<u8>,
+    /// How often each slot was given out, for fresh samples.
+    given: Vec<u32>,
+    /// Slots in use of each light, from its first.
+    active: Vec<u32>,
+    queue: Queue,
+    rings: Vec<Ring>,
+    /// Batches of a light in an older version are in other units.
+    units: Vec<u64>,
+    version: u64,
+    structure: u64,
+    /// Changes since the version of the oldest batch under way.
+    changes: VecDeque<(u64, Arc<Change>)>,
+    /// Slots in use without a path.
+    empty: u32,
+    stale_paths: u32,
+    next_task: u64,
+    next_applied: u64,
+    /// Versions of the tasks under way, in their order.
+    under_way: VecDeque<u64>,
+    waiting: BTreeMap<u64, (Task, PathBatch, u32)>,
+    counters: Counters,
+    refinement: Refinement,
+    /// Watts per unit of each column.
+    watts: Vec<Vec3>,
+    savings: Savings,
+}
+
+impl Ledger {
+    /// A ledger with an empty pool for the lights of `emitters` and `vsls` virtual surface lights.
+    pub fn new(scene: &Scene, emitters: Arc<Emitters>, vsls: usize) -> Self {
+        let columns = emitters.lights.iter().map(|l| (l.slots.end, l.column)).collect();
+        let slots = emitters.slots as usize;
+        let is_fresh = scene.streaming.sampling == Sampling::Fresh;
+        let mut ledger = Self {
+            pool: PathPool::new(columns, vsls),
+            slots: vec![0; slots],
+            given: vec![0; if is_fresh { slots } else { 0 }],
+            active: emitters.lights.iter().map(|l| l.slots.end - l.slots.start).collect(),
+            queue: Queue::new(&emitters),
+            rings: vec![Ring::default(); emitters.lights.len()],
+            units: vec![0; emitters.lights.len()],
+            sampling: scene.streaming.sampling,
+            version: 0,
+            structure: 0,
+            changes: VecDeque::new(),
+            empty: emitters.slots,
+            stale_paths: 0,
+            next_task: 0,
+            next_applied: 0,
+            under_way: VecDeque::new(),
+            waiting: BTreeMap::new(),
+            counters: Counters::default(),
+            refinement: Refinement::new(
+                if is_fresh { 0.0 } else { scene.streaming.target_error },
+                vsls,
+                &emitters,
+            ),
+            watts: emitters.column_watts(scene),
+            emitters,
+            savings: Savings::default(),
+        };
+        ledger.queue_open_slots();
+        ledger
+    }
+
+    /// Goes on in a new version of the scene; `change` says what it means for the paths.
+    ///
+    /// The pool is split as before: [`Emitters::with_scene`]. `budget` is the number of paths that can be traced in the
+    /// time a change may take: where more are stale, the lights with columns of their own go on with fewer slots, and
+    /// get them back when there is time.
+    pub fn revise(&mut self, simulation: &Simulation, change: Change, budget: Option<u32>) {
+        let emitters = Arc::clone(&simulation.emitters);
+        debug_assert!(self.emitters.lights.iter().zip(&emitters.lights).all(|(a, b)| a.slots == b.slots));
+        self.version += 1;
+        self.watts = emitters.column_watts(&simulation.scene);
+        self.emitters = emitters;
+        self.refinement.forget_error();
+        let needs_rays = (0..change.lights.len()).any(|light| change.may_concern(light));
+        for (index, revision) in change.lights.iter().enumerate() {
+            let light = &self.emitters.lights[index];
+            if revision.factor != Vec3::ONE {
+                self.units[index] = self.version;
+                self.pool.scale(light.slots.clone(), revision.factor);
+            }
+            if revision.factor != Vec3::ONE || change.may_concern(index) {
+                self.refinement.reset(light.column as usize, self.version);
+            }
+        }
+        if needs_rays {
+            self.make_stale(&change);
+        }
+        let change = Arc::new(change);
+        if !self.under_way.is_empty() {
+            self.changes.push_back((self.version, change));
+        }
+        if let Some(budget) = budget {
+            self.fit(budget);
+        }
+        self.queue_open_slots();
+    }
+
+    /// Marks the paths that `change` concerns.
+    fn make_stale(&mut self, change: &Change) {
+        for (index, light) in self.emitters.lights.iter().enumerate() {
+            let slots = light.slots.start..light.slots.start + self.active[index];
+            let (pool, marks) = (&self.pool, &self.slots);
+            let is_valid = |slot: &u32| marks[*slot as usize] & (FILLED | STALE) == FILLED;
+            let concerned: Vec<u32> = if change.lights[index].stale {
+                slots.clone().filter(is_valid).collect()
+            } else if change.may_concern(index) {
+                slots
+                    .clone()
+                    .into_par_iter()
+                    .with_min_len(8192)
+                    .filter(|slot| {
+                        is_valid(slot) && change.concerns(index, pool.trail(*slot).unwrap_or_default())
+                    })
+                    .collect()
+            } else {
+                Vec::new()
+            };
+            for &slot in &concerned {
+                self.slots[slot as usize] |= STALE;
+            }
+            self.stale_paths += concerned.len() as u32;
+            self.savings.retraced_paths += concerned.len() as u64;
+            let (pool, marks) = (&self.pool, &self.slots);
+            let kept = slots.filter(|&slot| marks[slot as usize] & (FILLED | STALE) == FILLED);
+            self.savings.rays_saved += kept.map(|slot| rays(pool, slot)).sum::<u64>();
+        }
+    }
+
+    /// Takes slots out of use until no more than `budget` of them have to be traced.
+    fn fit(&mut self, budget: u32) {
+        let open = self.empty + self.stale_paths;
+        if open <= budget {
+            return;
+        }
+        let share = f64::from(budget) / f64::from(open);
+        for index in 0..self.active.len() {
+            let light = &self.emitters.lights[index];
+            let column = &self.emitters.columns[light.column as usize];
+            let slots = light.slots.start..light.slots.start + self.active[index];
+            let is_open = |slot: u32| self.slots[slot as usize] & (FILLED | STALE) != FILLED;
+            // In a shared column a path's weight is that of its light's share of the slots.
+            if column.shared_watts.is_some() || !slots.clone().any(is_open) {
+                continue;
+            }
+            let fewer = (f64::from(self.active[index]) * share) as u32;
+            let fewer = fewer.max(LEAST_ACTIVE).min(self.active[index]);
+            for slot in light.slots.start + fewer..slots.end {
+                let mark = self.slots[slot as usize];
+                self.empty -= u32::from(mark & FILLED == 0);
+                self.stale_paths -= u32::from(mark & STALE != 0);
+                self.pool.remove(slot);
+                self.slots[slot as usize] = mark & UNDER_WAY;
+            }
+            self.active[index] = fewer;
+        }
+    }
+
+    /// Takes twice as many slots into use, as far as there are.
+    fn grow(&mut self) {
+        for (index, active) in self.active.iter_mut().enumerate() {
+            let slots = &self.emitters.lights[index].slots;
+            let more = active.saturating_mul(2).min(slots.end - slots.start);
+            self.empty += more - *active;
+            *active = more;
+        }
+        self.queue_open_slots();
+    }
+
+    /// Whether all slots are in use.
+    pub fn is_full(&self) -> bool {
+        self.emitters
+            .lights
+            .iter()
+            .zip(&self.active)
+            .all(|(l, &active)| l.slots.end - l.slots.start == active)
+    }
+
+    fn queue_open_slots(&mut self) {
+        self.queue.clear();
+        if self.empty + self.stale_paths == 0 {
+            return;
+        }
+        for (index, light) in self.emitters.lights.iter().enumerate() {
+            for slot in light.slots.start..light.slots.start + self.active[index] {
+                let mark = self.slots[slot as usize];
+                if mark & UNDER_WAY == 0 && mark & (FILLED | STALE) != FILLED {
+                    self.queue.push(index, slot, self.weight(light.column, slot));
+                }
+            }
+        }
+        self.queue.sort();
+    }
+
+    /// How bright the path in `slot` is; `None` where there is none.
+    fn weight(&self, column: u32, slot: u32) -> Option<f32> {
+        let deposits = self.pool.path(slot)?;
+        let sum = deposits.iter().fold([0i64; 3], |sum, d| [0, 1, 2].map(|i| sum[i] + i64::from(d.rgb[i])));
+        let [r, g, b] = sum.map(|x| x as f32);
+        let paths = self.pool.valid()[column as usize].max(1) as f32;
+        Some((Vec3::new(r, g, b) * self.watts[column as usize]).element_sum() / paths)
+    }
+
+    /// What to trace next; `None` where everything that is worth tracing has been given out.
+    pub fn next_task(&mut self) -> Option<Task> {
+        if let Some(task) = self.next_open_task(false) {
+            return Some(task);
+        }
+        if self.sampling == Sampling::Fresh {
+            return self.next_of_ring();
+        }
+        let is_settled = self.empty == 0 && self.stale_paths == 0 && self.queue.is_empty();
+        if is_settled && !self.is_full() {
+            self.grow();
+            return self.next_open_task(false);
+        }
+        if !is_settled {
+            return None;
+        }
+        let scales = self.all_scales();
+        let (light, draws) = self.refinement.next(self.pool.flux(), &scales, &self.emitters)?;
+        Some(self.task(light, draws, true))
+    }
+
+    /// As [`Ledger::next_task`], for paths of an older version alone.
+    pub fn next_stale_task(&mut self) -> Option<Task> {
+        self.next_open_task(true)
+    }
+
+    fn next_open_task(&mut self, only_stale: bool) -> Option<Task> {
+        let (mut slots, marks) = (Vec::new(), &mut self.slots);
+        let light = self.queue.take(PATHS_PER_TASK, only_stale, |slot| {
+            marks[slot as usize] |= UNDER_WAY;
+            slots.push(slot);
+        })?;
+        let draws = slots.into_iter().map(|slot| self.draw(slot)).collect();
+        Some(self.task(light, draws, false))
+    }
+
+    /// The next task of a stream of fresh samples: of the light that is behind, its oldest paths.
+    fn next_of_ring(&mut self) -> Option<Task> {
+        let lights = &self.emitters.lights;
+        let progress = |i: usize| self.rings[i].progress(lights[i].slots.end - lights[i].slots.start);
+        let light =
+            (0..lights.len()).reduce(|best, i| if progress(i) < progress(best) { i } else { best })?;
+        let slots = lights[light].slots.clone();
+        let marks = &self.slots;
+        let taken =
+            self.rings[light].take(slots, PATHS_PER_TASK, |slot| marks[slot as usize] & UNDER_WAY == 0);
+        if taken.is_empty() {
+            return None;
+        }
+        for &slot in &taken {
+            self.slots[slot as usize] |= UNDER_WAY;
+        }
+        let draws = taken.into_iter().map(|slot| self.draw(slot)).collect();
+        Some(self.task(light, draws, false))
+    }
+
+    fn draw(&mut self, slot: u32) -> Draw {
+        let mut generation = 0;
+        if let Some(given) = self.given.get_mut(slot as usize) {
+            generation = *given;
+            *given = given.wrapping_add(1);
+        }
+        Draw { slot, generation }
+    }
+
+    fn task(&mut self, light: usize, draws: Vec<Draw>, beyond_pool: bool) -> Task {
+        let (number, version, structure) = (self.next_task, self.version, self.structure);
+        self.next_task += 1;
+        self.under_way.push_back(version);
+        Task { number, draws, version, light, beyond_pool, structure }
+    }
+
+    /// Takes in the finished batch of a task, and of those that waited for it. Returns batches whose memory is free.
+    pub fn apply(&mut self, task: Task, batch: PathBatch, birth_ms: u32) -> Vec<PathBatch> {
+        if task.structure != self.structure {
+            // Of a scene with other triangles.
+            self.counters += batch.counters;
+            return vec![batch];
+        }
+        self.waiting.insert(task.number, (task, batch, birth_ms));
+        let mut free = Vec::new();
+        while let Some((task, batch, birth_ms)) = self.waiting.remove(&self.next_applied) {
+            self.counters += batch.counters;
+            self.next_applied += 1;
+            self.under_way.pop_front();
+            if task.beyond_pool {
+                let column = self.emitters.lights[task.light].column as usize;
+                self.refinement.apply(column, task.version, &batch, birth_ms);
+            } else {
+                self.take_in(&task, &batch, birth_ms);
+            }
+            free.push(batch);
+        }
+        let oldest = self.under_way.front().copied().unwrap_or(self.version);
+        while self.changes.front().is_some_and(|(version, _)| *version <= oldest) {
+            self.changes.pop_front();
+        }
+        free
+    }
+
+    /// Puts the paths of a batch into the pool.
+    fn take_in(&mut self, task: &Task, batch: &PathBatch, birth_ms: u32) {
+        let light = &self.emitters.lights[task.light];
+        let (column, in_use) = (light.column, light.slots.start + self.active[task.light]);
+        let is_in_other_units = task.version < self.units[task.light];
+        let mut is_queue_longer = false;
+        for path in batch.paths() {
+            let mark = self.slots[path.slot as usize] & !UNDER_WAY;
+            self.slots[path.slot as usize] = mark;
+            if path.slot >= in_use {
+                continue;
+            }
+            if is_in_other_units {
+                if mark & (FILLED | STALE) != FILLED {
+                    self.queue.push(task.light, path.slot, self.weight(column, path.slot));
+                    is_queue_longer = true;
+                }
+                continue;
+            }
+            let later = self.changes.iter().filter(|(version, _)| *version > task.version);
+            let is_stale =
+                later.map(|(_, change)| change).any(|change| change.concerns(task.light, path.vertices));
+            self.empty -= u32::from(mark & FILLED == 0);
+            self.stale_paths -= u32::from(mark & STALE != 0);
+            self.stale_paths += u32::from(is_stale);
+            self.pool.put(path.slot, path.deposits, path.vertices, birth_ms);
+            self.slots[path.slot as usize] = FILLED | if is_stale { STALE } else { 0 };
+            if is_stale {
+                self.savings.retraced_paths += 1;
+                self.queue.push(task.light, path.slot, self.weight(column, path.slot));
+                is_queue_longer = true;
+            }
+        }
+        if is_queue_longer {
+            self.queue.sort();
+        }
+    }
+
+    /// Tasks given out and not yet applied.
+    pub fn in_flight(&self) -> u64 {
+        self.next_task - self.next_applied
+    }
+
+    /// Paths in the pool that stand for an older version of the scene.
+    pub fn stale_paths(&self) -> u32 {
+        self.stale_paths
+    }
+
+    /// Slots in use: all, but while a change has to be followed in little time.
+    pub fn active_slots(&self) -> u32 {
+        self.active.iter().sum()
+    }
+
+    /// Samples beyond the pool in the present light.
+    pub fn refined_paths(&self) -> u64 {
+        self.refinement.all_paths()
+    }
+
+    /// The relative standard error of a light's flux in the mean over lights, weighted by flux.
+    pub fn relative_error(&self) -> f64 {
+        let measured = self.refinement.measured_error();
+        measured
+            .unwrap_or_else(|| self.pool.flux().errors(self.refinement.flux(), &self.all_scales()).relative())
+    }
+
+    /// What edits cost and saved so far.
+    pub fn savings(&self) -> Savings {
+        self.savings
+    }
+
+    /// Whether every slot in use holds a path of the present version: there is no light of an older one.
+    pub fn is_settled(&self) -> bool {
+        self.empty == 0 && self.stale_paths == 0
+    }
+
+    /// Whether every slot holds a path of the present version, and the light is refined as far as it is to be. A stream
+    /// of fresh samples goes on from there; replayed samples are all traced.
+    pub fn is_converged(&self) -> bool {
+        let is_traced = self.is_settled() && self.is_full();
+        is_traced
+            && (self.sampling == Sampling::Fresh || (self.in_flight() == 0 && self.refinement.is_done()))
+    }
+
+    /// Whether nothing is being traced and nothing is left to trace.
+    pub fn is_done(&self) -> bool {
+        let is_endless = self.sampling == Sampling::Fresh && !self.slots.is_empty();
+        self.in_flight() == 0 && !is_endless && self.is_converged()
+    }
+
+    /// The paths, and the flux they sum to.
+    pub fn pool(&self) -> &PathPool {
+        &self.pool
+    }
+
+    /// What has happened so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// What a unit of each column stands for with the lights' present powers.
+    pub fn scales(&self, scene: &Scene) -> Vec<ColumnScale> {
+        self.scales_of(&self.emitters.column_watts(scene))
+    }
+
+    fn all_scales(&self) -> Vec<ColumnScale> {
+        self.scales_of(&self.watts)
+    }
+
+    fn scales_of(&self, watts: &[Vec3]) -> Vec<ColumnScale> {
+        let columns = watts.iter().zip(self.pool.valid()).enumerate();
+        columns
+            .map(|(column, (&watts, &paths))| ColumnScale {
+                watts,
+                paths: paths + self.refinement.paths(column),
+            })
+            .collect()
+    }
+
+    /// The flux of every virtual surface light with the lights' present powers, in their order.
+    pub fn readings(&self, scene: &Scene) -> impl Iterator<Item = FluxReading> {
+        let scales = self.scales(scene);
+        let (flux, more) = (self.pool.flux(), self.refinement.flux());
+        (0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales))
+    }
+}
+
+/// Rays that the path in `slot` took.
+fn rays(pool: &PathPool, slot: u32) -> u64 {
+    pool.trail(slot).map_or(0, |vertices| vertices.len().saturating_sub(1) as u64)
+}
