@@ -49,6 +49,7 @@ mod lanes_x86;
 mod node;
 mod part;
 mod ray_frame;
+mod refit;
 mod scene_bvh;
 mod split;
 mod triangle;

@@ -12,6 +12,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use super::collapse::collapse;
 use super::lanes::WIDTH;
 use super::node::{NONE, Node};
+use super::refit::surface_cost;
 use super::split::split;
 use super::triangle::{Packet, is_solid};
 
@@ -37,6 +38,8 @@ pub struct Bvh {
     pub(super) hi: Vec3,
     pub(super) triangles: u32,
     pub(super) ignored: u32,
+    /// Surface cost of the tree when it was built; see [`surface_cost`].
+    pub(super) built_cost: f64,
 }
 
 impl Bvh {
@@ -68,6 +71,7 @@ impl Bvh {
             (packets.len() - 1) as u32
         });
         let bounds = boxes.iter().fold(Aabb::INVALID, |all, b| all.union(b));
+        let built_cost = surface_cost(&wide.nodes, bounds.min.into(), bounds.max.into());
         Self {
             nodes: wide.nodes,
             packets,
@@ -76,6 +80,7 @@ impl Bvh {
             hi: bounds.max.into(),
             triangles: ids.len() as u32,
             ignored: (asked - ids.len()) as u32,
+            built_cost,
         }
     }
 
@@ -101,7 +106,7 @@ pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
         2,
     );
     improve(&mut clustered);
-    if surface_cost(&clustered) < surface_cost(&cut) { clustered } else { cut }
+    if inner_area(&clustered) < inner_area(&cut) { clustered } else { cut }
 }
 
 /// Number of boxes that are the same, at most.
@@ -134,6 +139,6 @@ fn improve(tree: &mut Bvh2) {
 }
 
 /// Area of all inner nodes: what a random line pays.
-fn surface_cost(tree: &Bvh2) -> f64 {
+fn inner_area(tree: &Bvh2) -> f64 {
     tree.nodes.iter().filter(|node| !node.is_leaf()).map(|node| f64::from(node.aabb().half_area())).sum()
 }

@@ -59,12 +59,17 @@ impl SceneBvh {
         scene
     }
 
-    /// Builds part number `part` anew after its vertices moved; the others are shared, not touched.
+    /// Brings part number `part` up to date after its vertices moved; the others are shared, not touched.
+    ///
+    /// The tree of a large part is kept, with its boxes around the moved triangles, as long as it is good: see
+    /// `refit.rs`. Hits are the same either way.
     ///
     /// A number that is not a part changes nothing.
     pub fn rebuild_part(&mut self, part: usize, vertices: &[Vec3], triangles: &[[u32; 3]]) {
         if let Some(part) = self.parts.get_mut(part) {
-            part.bvh = Arc::new(Bvh::build(vertices, triangles, part.range.clone()));
+            let refitted = part.bvh.refitted(vertices, triangles);
+            let bvh = refitted.unwrap_or_else(|| Bvh::build(vertices, triangles, part.range.clone()));
+            part.bvh = Arc::new(bvh);
             self.build_top();
         }
     }

@@ -5,5 +5,6 @@
 mod brute_force;
 mod degenerate;
 mod parts;
+mod refit;
 mod shapes;
 mod watertight;
