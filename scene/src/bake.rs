@@ -118,8 +118,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
                 "use fewer segments or leave objects out",
             ));
         }
-        let pose =
-            Pose { rotation: part.placement.rotation, offset: pose::offset(part.placement.position, origin) };
+        let pose = Pose::new(&part.placement, origin);
         let rest = soup.push_vertices(&part, &pose)?;
         let dropped = soup.push_triangles(&part, &rest, id);
         let last_triangle = soup.triangles.len() as u32;
@@ -138,7 +137,8 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             ));
         }
         if let Some(emitter) = &part.emitter {
-            let shapes = emitter.faces.iter().map(|face| (*face, rest.light_shape(*face, &soup.vertices)));
+            let shapes =
+                emitter.faces.iter().map(|face| (*face, rest.light_shape(*face, &pose, &soup.vertices)));
             let lights = shapes.filter(|(_, shape)| shape.area() > 0.0).collect();
             emitters.push(BakedEmitter { object: id, strength: emitter.strength, lights });
         }
@@ -147,7 +147,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             material: material_id(materials, &part.material),
             sides: part.sides,
             triangles: first_triangle..last_triangle,
-            world_from_rest: pose.world_from_rest(rest.centre),
+            world_from_rest: pose.world_from_rest(rest.centre(pose.scale)),
             emitter: None,
         });
         rest_meshes.push(rest);
@@ -176,13 +176,13 @@ struct Soup {
 impl Soup {
     /// World and rest vertices of a part.
     fn push_vertices(&mut self, part: &Part<'_>, pose: &Pose) -> Result<RestMesh, SceneError> {
-        let scale = part.placement.scale;
-        let scaled: Vec<DVec3> = part.mesh.vertices.iter().map(|&vertex| scale * vertex).collect();
-        // Rest space is centred, so that a mesh given far from its own origin keeps its precision.
-        let used = part.mesh.triangles.iter().flatten().map(|&i| scaled[i as usize]);
-        let centre = snapped_centre(box_around(used));
+        let own = part.mesh.vertices.clone();
         let first = self.vertices.len() as u32;
-        for &point in &scaled {
+        let used = box_around(part.mesh.triangles.iter().flatten().map(|&i| own[i as usize]));
+        let vertices = first..first + own.len() as u32;
+        let mesh = RestMesh { own, vertices, used, loaded: *pose };
+        let centre = mesh.centre(pose.scale);
+        for &point in &mesh.own {
             let world = pose.apply(point);
             if !world.is_finite() || world.abs().max_element() > MAX_LENGTH_M {
                 return Err(part.field.invalid(
@@ -192,17 +192,16 @@ impl Soup {
                 ));
             }
             self.vertices.push(pose::round(world));
-            self.rest_vertices.push(pose::round(point - centre));
+            self.rest_vertices.push(RestMesh::rest_vertex(point, pose.scale, centre));
         }
-        let vertices = first..self.vertices.len() as u32;
-        Ok(RestMesh { scaled, vertices, centre, mirrored: part.placement.is_mirrored(), loaded: *pose })
+        Ok(mesh)
     }
 
     /// Adds the triangles that have an area, turned where the part is mirrored; returns how many have none.
     fn push_triangles(&mut self, part: &Part<'_>, rest: &RestMesh, id: ObjectId) -> u32 {
         let mut dropped = 0;
         for &[a, b, c] in &part.mesh.triangles {
-            let turned = if rest.mirrored { [a, c, b] } else { [a, b, c] };
+            let turned = if rest.loaded.is_mirrored() { [a, c, b] } else { [a, b, c] };
             let triangle = turned.map(|i| i + rest.vertices.start);
             match surface::normal(triangle.map(|i| self.vertices[i as usize])) {
                 Some(normal) => {

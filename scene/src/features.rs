@@ -30,8 +30,10 @@ pub struct Features {
     /// 0 means that no surface ends in the open: light within a room cannot leave it. More than 0 may still be a
     /// closed room, where edges lie on the middle of other faces.
     pub open_edges: u32,
-    /// Objects that move.
+    /// Objects that are animated.
     pub moving_objects: u32,
+    /// Lights whose place or direction is animated, or that an animated object shows.
+    pub moving_lights: u32,
     /// Textures of materials.
     pub textures: u32,
 }
@@ -69,6 +71,7 @@ impl Features {
             triangles: geometry.triangles.len() as u32,
             open_edges: open_edges(geometry),
             moving_objects: 0,
+            moving_lights: 0,
             textures: 0,
         }
     }
@@ -131,8 +134,14 @@ impl Features {
             },
             Decision {
                 what: "motion",
-                modelled: self.moving_objects > 0,
-                reason: of_objects(self.moving_objects, "move"),
+                modelled: self.moving_objects + self.moving_lights > 0,
+                reason: format!(
+                    "{} of {} objects and {} of {} lights move",
+                    self.moving_objects,
+                    self.objects,
+                    self.moving_lights,
+                    self.lights()
+                ),
             },
             Decision {
                 what: "textures",

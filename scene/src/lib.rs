@@ -4,6 +4,7 @@
 //! [`SceneConfig::build`] validates and bakes, [`Scene::load`] does both; [`Scene::edit`] changes a loaded scene. `configs/README.md` lists every key.
 #![forbid(unsafe_code)]
 
+mod animation;
 mod bake;
 mod build;
 pub mod bvh;
@@ -18,6 +19,7 @@ mod primitives;
 mod scene;
 mod settings;
 
+pub use animation::Animation;
 pub use config::SceneConfig;
 pub use edit::SceneEdit;
 pub use error::{Place, SceneError};

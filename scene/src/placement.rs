@@ -1,7 +1,7 @@
 //! Turns position, rotation and scale of an object into the maps between its own, its rest and the config's space.
 
 use crate::{
-    config::{Field, ObjectConfig, OneOrThree, Vector},
+    config::{Field, OneOrThree, Vector},
     error::SceneError,
     primitives::sin_cos_turn,
 };
@@ -16,24 +16,21 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
-    pub(crate) const IDENTITY: Self =
-        Self { scale: DVec3::ONE, rotation: DMat3::IDENTITY, position: DVec3::ZERO };
-
-    /// Reads a placement, and writes its defaults into `object`.
-    pub(crate) fn resolve(object: &mut ObjectConfig, field: &Field<'_>) -> Result<Self, SceneError> {
-        let position = *object.position_m.get_or_insert(Vector::default());
-        let angles = *object.rotation_deg.get_or_insert(Vector::default());
-        let scale = *object.scale.get_or_insert(OneOrThree([1.0; 3]));
+    /// Reads the placement that a table gives by `position_m`, `rotation_deg` and `scale`, and writes their defaults.
+    pub(crate) fn resolve(
+        position: &mut Option<Vector>,
+        angles: &mut Option<Vector>,
+        scale: &mut Option<OneOrThree>,
+        field: &Field<'_>,
+    ) -> Result<Self, SceneError> {
+        let position = *position.get_or_insert(Vector::default());
+        let angles = *angles.get_or_insert(Vector::default());
+        let scale = *scale.get_or_insert(OneOrThree([1.0; 3]));
         Ok(Self {
             position: field.key("position_m").metres(position)?,
             rotation: rotation(field.key("rotation_deg").degrees(angles)?),
             scale: field.key("scale").scale(scale)?,
         })
-    }
-
-    /// Whether the scale turns a mesh inside out.
-    pub(crate) fn is_mirrored(&self) -> bool {
-        self.scale.x * self.scale.y * self.scale.z < 0.0
     }
 
     /// A point of the object's own coordinates in those of the config.

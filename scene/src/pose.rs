@@ -1,40 +1,57 @@
 //! Turns where an object stands into its vertices in the scene's space, at load and whenever it moves.
 
-use crate::bake::EmitterFace;
+use crate::{
+    bake::{EmitterFace, snapped_centre},
+    placement::Placement,
+};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use photonstream_shading::LightShape;
 use std::ops::Range;
 
-/// The mesh of an object at its final size, as exactly as the config gives it.
+/// The mesh of an object in its own coordinates, as exactly as the config gives it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RestMesh {
-    /// Vertices along the object's own axes, m.
-    pub(crate) scaled: Vec<DVec3>,
+    /// Vertices in the object's own coordinates, m.
+    pub(crate) own: Vec<DVec3>,
     /// Where they are in [`crate::Geometry::vertices`].
     pub(crate) vertices: Range<u32>,
-    /// The origin of rest space.
-    pub(crate) centre: DVec3,
-    /// Whether the scale turned the mesh inside out, and its triangles back.
-    pub(crate) mirrored: bool,
+    /// The box around those of them that triangles use, lower and upper corner.
+    pub(crate) used: (DVec3, DVec3),
     /// How the object stood at load.
     pub(crate) loaded: Pose,
 }
 
-/// How an object at its final size is turned and moved into the scene's space.
+/// How an object is scaled to its final size, then turned and moved into the scene's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pose {
+    /// Along the object's own axes; an odd number of negative factors turns it inside out, and its triangles back.
+    pub(crate) scale: DVec3,
     pub(crate) rotation: DMat3,
     /// Position relative to the scene's origin, m.
     pub(crate) offset: DVec3,
 }
 
 impl Pose {
+    /// Where an object stands in a scene around `origin`.
+    pub(crate) fn new(placement: &Placement, origin: DVec3) -> Self {
+        Self {
+            scale: placement.scale,
+            rotation: placement.rotation,
+            offset: offset(placement.position, origin),
+        }
+    }
+
+    /// Whether the scale turns a mesh inside out.
+    pub(crate) fn is_mirrored(&self) -> bool {
+        self.scale.x * self.scale.y * self.scale.z < 0.0
+    }
+
     /// A vertex in the scene's space.
     ///
     /// It comes from the config's numbers directly, not by way of rest space: equal numbers give equal bits, so that
     /// neighbouring quads share their edges without a gap.
-    pub(crate) fn apply(&self, scaled: DVec3) -> DVec3 {
-        self.rotation * scaled + self.offset
+    pub(crate) fn apply(&self, own: DVec3) -> DVec3 {
+        self.rotation * (self.scale * own) + self.offset
     }
 
     /// The motion from the rest space around `centre`.
@@ -42,19 +59,31 @@ impl Pose {
         DAffine3 { matrix3: self.rotation, translation: self.offset + self.rotation * centre }
     }
 
-    /// The pose that gives `motion` from the rest space around `centre`, to the rounding of f64.
-    pub(crate) fn from_motion(motion: &DAffine3, centre: DVec3) -> Self {
-        Self { rotation: motion.matrix3, offset: motion.translation - motion.matrix3 * centre }
+    /// The pose at the same size that gives `motion` from the rest space around `centre`, to the rounding of f64.
+    pub(crate) fn moved(self, motion: &DAffine3, centre: DVec3) -> Self {
+        Self { rotation: motion.matrix3, offset: motion.translation - motion.matrix3 * centre, ..self }
     }
 }
 
 impl RestMesh {
+    /// The origin of rest space for a mesh of this size: a mesh given far from its own origin keeps its precision.
+    pub(crate) fn centre(&self, scale: DVec3) -> DVec3 {
+        // Rounding is monotone: the box of the scaled vertices is the scaled box.
+        let (a, b) = (scale * self.used.0, scale * self.used.1);
+        snapped_centre((a.min(b), a.max(b)))
+    }
+
+    /// A vertex in rest space.
+    pub(crate) fn rest_vertex(own: DVec3, scale: DVec3, centre: DVec3) -> Vec3 {
+        round(scale * own - centre)
+    }
+
     /// The shape of the light that a face emits; `vertices` are those of the whole scene.
-    pub(crate) fn light_shape(&self, face: EmitterFace, vertices: &[Vec3]) -> LightShape {
+    pub(crate) fn light_shape(&self, face: EmitterFace, pose: &Pose, vertices: &[Vec3]) -> LightShape {
         let (EmitterFace::Parallelogram(corners) | EmitterFace::Triangle(corners)) = face;
         let [corner, u, v] = corners.map(|i| vertices[(i + self.vertices.start) as usize]);
         let (edge_u, edge_v) =
-            if self.mirrored { (v - corner, u - corner) } else { (u - corner, v - corner) };
+            if pose.is_mirrored() { (v - corner, u - corner) } else { (u - corner, v - corner) };
         match face {
             EmitterFace::Parallelogram(_) => LightShape::Parallelogram { corner, edge_u, edge_v },
             EmitterFace::Triangle(_) => LightShape::Triangle { corner, edge_u, edge_v },

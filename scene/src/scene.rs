@@ -1,6 +1,7 @@
 //! Gathers what a loaded scene is: baked geometry, materials, lights, camera, settings and the ray-tracing structure.
 
 use crate::{
+    animation::Animation,
     bake::{EmitterFace, Strength},
     bvh::SceneBvh,
     config::LightConfig,
@@ -61,6 +62,8 @@ pub struct Scene {
     pub features: Features,
     /// What was repaired or left out while loading, one sentence each.
     pub notices: Vec<String>,
+    /// What moves and dims lights and objects; as loaded, the scene is what it is at time 0.
+    pub animation: Arc<Animation>,
     /// The mesh of each object, to be posed anew.
     pub(crate) rest_meshes: Arc<[RestMesh]>,
     /// How each object stands.
@@ -156,7 +159,7 @@ pub struct SceneLight {
     pub(crate) face: Option<(EmitterFace, Strength)>,
 }
 
-/// All triangles of a scene; what does not change when objects move is shared by all versions of the scene.
+/// All triangles of a scene; what does not change when objects move at their size is shared by all versions of the scene.
 ///
 /// Triangles without area are left out at load; mirrored objects have their winding turned,
 /// so that normals point outwards.
@@ -188,6 +191,13 @@ impl Geometry {
     }
 }
 
+impl Object {
+    /// Whether `name` is the object's, or that of the import it comes from.
+    pub(crate) fn is_called(&self, name: &str) -> bool {
+        self.name.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    }
+}
+
 impl Scene {
     /// The object called `name`.
     pub fn object(&self, name: &str) -> Option<ObjectId> {
@@ -197,6 +207,11 @@ impl Scene {
     /// The light called `name`.
     pub fn light(&self, name: &str) -> Option<LightId> {
         self.lights.binary_search_by(|l| l.name.as_str().cmp(name)).ok().map(|i| LightId(i as u32))
+    }
+
+    /// The material called `name`.
+    pub fn material(&self, name: &str) -> Option<MaterialId> {
+        self.materials.binary_search_by(|m| m.name.as_str().cmp(name)).ok().map(|i| MaterialId(i as u32))
     }
 
     /// The reflectance of an object, linear RGB.

@@ -1,6 +1,9 @@
 //! Gathers the validated settings of simulation and rendering, with their defaults.
 
-use crate::scene::Sides;
+use crate::{
+    config::{AnimatedProperty, Interpolation, Repeat},
+    scene::Sides,
+};
 use photonstream_shading::{Kernel, tone::ToneMap};
 
 /// Which sample a slot of the path pool uses when it is traced again.
@@ -45,6 +48,14 @@ pub struct StreamingSettings {
     pub threads: Option<u32>,
     /// Lights beyond this number share one column of flux.
     pub light_columns: u32,
+    /// Simulated time from one published frame to the next, ms: runs repeat exactly. `None`: as much as passes on the
+    /// clock.
+    pub fixed_step_ms: Option<f64>,
+    /// Relative standard error of the flux, in [0, 1], down to which samples beyond the pool are added while nothing
+    /// changes; 0: none are.
+    pub target_error: f64,
+    /// Time within which a change shall be traced, ms, by a pool of fitting size; 0: the pool keeps its size.
+    pub latency_ms: f64,
 }
 
 impl StreamingSettings {
@@ -66,6 +77,9 @@ impl Default for StreamingSettings {
             publish_period_ms: 10.0,
             threads: None,
             light_columns: 8,
+            fixed_step_ms: None,
+            target_error: 0.0,
+            latency_ms: 0.0,
         }
     }
 }
@@ -132,5 +146,18 @@ macro_rules! named {
 }
 
 named!(Sides, "sides", Front = "front", Back = "back", Both = "both");
+named!(
+    AnimatedProperty,
+    "property",
+    Position = "position_m",
+    Rotation = "rotation_deg",
+    Scale = "scale",
+    Power = "power_w",
+    Irradiance = "irradiance_w_m2",
+    Direction = "direction",
+    Target = "target_m"
+);
+named!(Interpolation, "interpolation", Linear = "linear", Smooth = "smooth", Step = "step");
+named!(Repeat, "repeat", Loop = "loop", Bounce = "bounce", Once = "once");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
 named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays");

@@ -45,6 +45,7 @@ fn every_config_loads_and_resolves_to_itself() {
         assert_eq!((&again.streaming, &again.render), (&scene.streaming, &scene.render));
         assert_eq!((again.origin_m, again.bounds), (scene.origin_m, scene.bounds));
         assert_eq!((&again.name, &again.features), (&scene.name, &scene.features));
+        assert_eq!(again.animation, scene.animation);
     }
     assert!(count >= 5, "only {count} configs found");
 }
@@ -57,6 +58,9 @@ fn cameras_see_reflecting_sides() {
         "cornell-box.toml",
         "cornell-knot.toml",
         "cornell-original.toml",
+        "cornell-light.toml",
+        "cornell-ball.toml",
+        "door-room.toml",
         "integrating-sphere.toml",
         "two-rooms.toml",
     ] {

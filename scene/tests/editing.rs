@@ -2,7 +2,11 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::{DAffine3, DVec3, Vec3};
-use photonstream_scene::{AssetRoots, LightId, ObjectId, Scene, SceneConfig, bvh::Ray, config::Vector};
+use photonstream_scene::{
+    AssetRoots, LightId, ObjectId, Scene, SceneConfig,
+    bvh::Ray,
+    config::{OneOrThree, Vector},
+};
 use photonstream_shading::{Light, LightShape};
 use serde_json::{Map, Value, json};
 use std::{path::Path, sync::Arc};
@@ -17,10 +21,10 @@ fn config(shift: DVec3) -> SceneConfig {
         format!("[object.room]\nmaterial = \"white\"\nsides = \"back\"\nposition_m = {}\nbox = {{ size_m = [4, 3, 5] }}\n", p(0.1, 0.2, 0.3)),
         format!("[object.ball]\nmaterial = \"white\"\nposition_m = {}\nscale = [1, 1.3, -0.7]\nsphere = {{ radius_m = 0.45, segments = 24 }}\n", p(0.3, 0.1, 0.2)),
         format!("[object.crate]\nmaterial = \"white\"\nposition_m = {}\nrotation_deg = [0, 30, 0]\nbox = {{ size_m = [0.3, 0.7, 0.4] }}\n", p(-0.3, -0.1, 0.2)),
-        format!("[object.sheet]\nmaterial = \"white\"\nsides = \"both\"\nquad = {{ corner_m = {}, edge_u_m = [0.6, 0, 0.1], edge_v_m = [0, 0.4, 0] }}\n", p(-0.7, 0.3, -0.9)),
+        format!("[object.sheet]\nmaterial = \"white\"\nsides = \"both\"\nposition_m = {}\nquad = {{ corner_m = [0.1, -0.2, 0.3], edge_u_m = [0.6, 0, 0.1], edge_v_m = [0, 0.4, 0] }}\n", p(-0.7, 0.3, -0.9)),
         format!("[light.bulb]\npower_w = [3, 2, 1]\npoint = {{ position_m = {} }}\n", p(0.7, 0.9, 0.1)),
         format!("[light.cone]\npower_w = 5\nspot = {{ position_m = {}, target_m = {}, outer_half_angle_deg = 40 }}\n", p(0.1, 1.3, 0.2), p(0.0, -0.3, 0.1)),
-        format!("[light.lamp]\npower_w = 5\nrectangle = {{ corner_m = {}, edge_u_m = [0.25, 0, 0], edge_v_m = [0, 0, 0.25] }}\n", p(-0.125, 1.25, -0.125)),
+        format!("[light.lamp]\npower_w = 5\nrectangle = {{ position_m = {}, corner_m = [0, 0, 0], edge_u_m = [0.25, 0, 0], edge_v_m = [0, 0, 0.25] }}\n", p(-0.125, 1.25, -0.125)),
         "[light.sun]\nirradiance_w_m2 = 2\ndirectional = { direction = [1, -3, 2] }\n".into(),
     ]
     .concat();
@@ -51,9 +55,10 @@ impl Random {
 
 /// All that edits may change is equal bit for bit, and so is what rays see: 500 from within the room, seed 7.
 fn assert_same(edited: &Scene, loaded: &Scene) {
-    assert_eq!(edited.geometry, loaded.geometry);
+    assert!(edited.geometry == loaded.geometry, "vertices, normals or triangles differ");
     assert_eq!((edited.bounds, edited.origin_m), (loaded.bounds, loaded.origin_m));
     assert_eq!((&edited.objects, &edited.lights), (&loaded.objects, &loaded.lights));
+    assert_eq!(edited.materials, loaded.materials);
     let mut random = Random(7);
     for _ in 0..500 {
         let origin = random.vector(1.4).as_vec3();
@@ -62,37 +67,66 @@ fn assert_same(edited: &Scene, loaded: &Scene) {
     }
 }
 
-/// 40 random edits one after another, seed 1, here and 3 000 km away, each compared with a scene loaded from the config
-/// with the same numbers written into it. Exact: no tolerance.
+/// 200 versions of one to three random edits each, seed 1, here and 3 000 km away, each compared with a scene loaded from
+/// the config with the same numbers written into it. Exact: no tolerance.
 #[test]
 fn random_edits_equal_an_equally_edited_config() {
     for shift in [DVec3::ZERO, DVec3::new(3_000_000.5, -1234.25, 8000.0)] {
         let mut config = config(shift);
         let mut scene = build(config.clone());
         let mut random = Random(1);
-        for step in 0..40 {
-            let (position, angles) = (shift + random.vector(0.9), random.vector(200.0));
+        for step in 0..200 {
             let mut edit = scene.edit();
-            if step % 2 == 0 {
-                let name = ["ball", "crate", "sheet"][step / 2 % 3];
-                let object = config.object.get_mut(name).unwrap();
-                let mut keys = Map::new();
-                if step % 5 != 0 {
-                    object.position_m = Some(position.into());
-                    keys.insert("position_m".into(), json!(position.to_array()));
+            for _ in 0..=step % 3 {
+                match (random.next() * 8.0) as usize {
+                    0 => edit_material(&mut config, &mut edit, &mut random),
+                    which @ 1..=3 => edit_object(&mut config, &mut edit, which - 1, shift, &mut random),
+                    which => {
+                        let position = shift + random.vector(0.9);
+                        edit_light(&mut config, &mut edit, which - 4, position, &mut random);
+                    }
                 }
-                if step % 3 != 0 || keys.is_empty() {
-                    object.rotation_deg = Some(angles.into());
-                    keys.insert("rotation_deg".into(), json!(angles.to_array()));
-                }
-                assert_eq!(edit.move_object(name, &keys).unwrap(), [scene.object(name).unwrap()]);
-            } else {
-                edit_light(&mut config, &mut edit, step / 2 % 4, position, &mut random);
             }
             scene = edit.finish();
+            scene.bvh.validate().unwrap();
             assert_same(&scene, &build(config.clone()));
         }
     }
+}
+
+fn edit_material(config: &mut SceneConfig, edit: &mut photonstream_scene::SceneEdit, random: &mut Random) {
+    let albedo = [random.next(), random.next(), random.next()];
+    config.material.get_mut("white").unwrap().albedo = OneOrThree(albedo);
+    edit.set_material("white", &values(json!({ "albedo": albedo }))).unwrap();
+}
+
+/// Moves, turns and stretches an object, one or several of them, half of the stretches mirrored.
+fn edit_object(
+    config: &mut SceneConfig,
+    edit: &mut photonstream_scene::SceneEdit,
+    which: usize,
+    shift: DVec3,
+    random: &mut Random,
+) {
+    let name = ["ball", "crate", "sheet"][which];
+    let object = config.object.get_mut(name).unwrap();
+    let mut keys = Map::new();
+    if random.next() < 0.5 {
+        let position = shift + random.vector(0.9);
+        object.position_m = Some(position.into());
+        keys.insert("position_m".into(), json!(position.to_array()));
+    }
+    if random.next() < 0.5 {
+        let scale = (random.vector(1.0) + random.vector(1.0).signum() * 0.2).to_array();
+        object.scale = Some(OneOrThree(scale));
+        keys.insert("scale".into(), json!(scale));
+    }
+    if random.next() < 0.5 || keys.is_empty() {
+        let angles = random.vector(200.0);
+        object.rotation_deg = Some(angles.into());
+        keys.insert("rotation_deg".into(), json!(angles.to_array()));
+    }
+    edit.move_object(name, &keys).unwrap();
 }
 
 fn edit_light(
@@ -105,7 +139,7 @@ fn edit_light(
     let power = random.next();
     let name = ["bulb", "cone", "lamp", "sun"][which];
     let light = config.light.get_mut(name).unwrap();
-    let scalar = Some(photonstream_scene::config::OneOrThree([power; 3]));
+    let scalar = Some(OneOrThree([power; 3]));
     let keys = match which {
         0 => {
             (light.power_w, light.point.as_mut().unwrap().position_m) = (scalar, position.into());
@@ -119,6 +153,12 @@ fn edit_light(
         }
         2 => {
             light.power_w = scalar;
+            let turn = Vector(random.vector(90.0).to_array());
+            let size = 0.5 + random.next();
+            let lamp = light.rectangle.as_mut().unwrap();
+            (lamp.rotation_deg, lamp.scale) = (Some(turn), Some(OneOrThree([size, -size, size])));
+            let keys = json!({ "rotation_deg": turn.0, "scale": [size, -size, size] });
+            edit.move_object("lamp", &values(keys)).unwrap();
             json!({ "power_w": [power, power, power], "enabled": true })
         }
         _ => {
@@ -166,13 +206,14 @@ fn a_motion_gives_what_its_keys_give() {
 fn an_emitter_takes_its_light_along() {
     let scene = build(config(DVec3::ZERO));
     let mut edit = scene.edit();
-    edit.move_object("lamp", &values(json!({ "position_m": [0.5, -0.25, 0.75] }))).unwrap();
+    edit.move_object("lamp", &values(json!({ "position_m": [0.375, 1.0, 0.625] }))).unwrap();
     edit.set_light("lamp", &values(json!({ "power_w": 7 }))).unwrap();
     let edited = edit.finish();
     let mut config = config(DVec3::ZERO);
     let lamp = config.light.get_mut("lamp").unwrap();
-    lamp.power_w = Some(photonstream_scene::config::OneOrThree([7.0; 3]));
-    lamp.rectangle.as_mut().unwrap().corner_m = Vector([0.375, 1.0, 0.625]);
+    lamp.power_w = Some(OneOrThree([7.0; 3]));
+    let shape = lamp.rectangle.as_mut().unwrap();
+    (shape.corner_m, shape.position_m) = (Vector([0.375, 1.0, 0.625]), None);
     let loaded = build(config);
     let id = loaded.light("lamp").unwrap().0 as usize;
     assert_eq!(edited.lights[id].light, loaded.lights[id].light);
@@ -216,6 +257,18 @@ fn versions_share_what_they_do_not_change() {
     for (index, (a, b)) in parts(&moved).into_iter().zip(parts(&scene)).enumerate() {
         assert_eq!(a == b, index != ball, "part {index}");
     }
+    let mut edit = scene.edit();
+    edit.move_object("ball", &values(json!({ "scale": 2 }))).unwrap();
+    // The ball is mirrored at load, and no longer.
+    let stretched = edit.finish();
+    assert!(!Arc::ptr_eq(&stretched.geometry.rest_vertices, &scene.geometry.rest_vertices));
+    assert!(!Arc::ptr_eq(&stretched.geometry.triangles, &scene.geometry.triangles));
+    assert!(Arc::ptr_eq(&stretched.geometry.object_of, &scene.geometry.object_of));
+    let mut edit = stretched.edit();
+    edit.set_material("white", &values(json!({ "albedo": 0.25 }))).unwrap();
+    let painted = edit.finish();
+    assert!(Arc::ptr_eq(&painted.geometry, &stretched.geometry));
+    assert_eq!(painted.albedo(painted.object("ball").unwrap()), Vec3::splat(0.25));
 }
 
 #[test]
@@ -225,7 +278,26 @@ fn bad_edits_say_where_what_and_what_instead() {
         |name: &str, keys: Value| scene.edit().set_light(name, &values(keys)).unwrap_err().to_string();
     let object =
         |name: &str, keys: Value| scene.edit().move_object(name, &values(keys)).unwrap_err().to_string();
+    let material =
+        |name: &str, keys: Value| scene.edit().set_material(name, &values(keys)).unwrap_err().to_string();
     for (error, expected) in [
+        (
+            material("whit", json!({ "albedo": 1 })),
+            r#"material: no material is called "whit", did you mean "white"?"#,
+        ),
+        (
+            material("white", json!({ "albdo": 1 })),
+            r#"material.white: unknown key "albdo", did you mean "albedo"?"#,
+        ),
+        (
+            material("white", json!({ "albedo": 1.5 })),
+            "material.white.albedo: found [1.5, 1.5, 1.5], expected albedos",
+        ),
+        (
+            material("white", json!({ "albedo": "a" })),
+            r#"material.white.albedo: found "a", expected a number or three"#,
+        ),
+        (material("white", json!({})), "material.white: found no value, expected some of albedo"),
         (light("lmap", json!({ "power_w": 1 })), r#"light: no light is called "lmap", did you mean "lamp"?"#),
         (light("bulb", json!({ "power": 1 })), r#"light.bulb: unknown key "power", did you mean "power_w"?"#),
         (light("bulb", json!({ "direction": 1 })), "expected one of: power_w, enabled, position_m"),
@@ -283,6 +355,15 @@ fn bad_edits_say_where_what_and_what_instead() {
         ),
         (object("ball", json!({ "position_m": [1e9, 0, 0] })), "object.ball: found a vertex"),
         (object("ball", json!({ "rotation_deg": [1e9, 0, 0] })), "object.ball.rotation_deg: found"),
+        (
+            object("ball", json!({ "scale": [1, 0, 1] })),
+            "object.ball.scale: found [1, 0, 1], expected factors",
+        ),
+        (
+            object("ball", json!({ "scale": "x" })),
+            r#"object.ball.scale: found "x", expected a number or three"#,
+        ),
+        (object("ball", json!({ "scale": 1e9, "position_m": [1e9, 0, 0] })), "object.ball: found a vertex"),
     ] {
         assert!(error.contains(expected), "{error:?} lacks {expected:?}");
     }

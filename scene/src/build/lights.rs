@@ -106,7 +106,7 @@ pub(crate) fn read_plain(
                 ("directional", directional.is_some()),
                 ("rectangle", rectangle.is_some()),
             ];
-            return Err(not_one_shape(field, &given));
+            return Err(not_one_of(field, &given));
         }
     };
     let irradiance = matches!(shape, PlainShape::Directional { .. });
@@ -115,7 +115,7 @@ pub(crate) fn read_plain(
 }
 
 /// The error of a table that should have exactly one of some keys.
-pub(super) fn not_one_shape(field: &Field<'_>, keys: &[(&str, bool)]) -> SceneError {
+pub(crate) fn not_one_of(field: &Field<'_>, keys: &[(&str, bool)]) -> SceneError {
     let given: Vec<_> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
     let all: Vec<_> = keys.iter().map(|(key, _)| *key).collect();
     let found = if given.is_empty() { "none".to_owned() } else { given.join(" and ") };
@@ -167,7 +167,7 @@ fn read_spot(spot: &mut SpotConfig, field: &Field<'_>) -> Result<PlainShape, Sce
         (None, Some(direction)) => field.key("direction").direction(direction)?,
         (target, direction) => {
             let given = [("target_m", target.is_some()), ("direction", direction.is_some())];
-            return Err(not_one_shape(field, &given));
+            return Err(not_one_of(field, &given));
         }
     };
     let outer_deg = field.key("outer_half_angle_deg").number(
@@ -194,6 +194,8 @@ fn read_rectangle<'a>(
     let albedo = field.key("albedo").albedo(albedo)?;
     let material = format!("{name}/emitter");
     materials.add(material.clone(), albedo);
+    let RectangleConfig { position_m, rotation_deg, scale, .. } = rectangle;
+    let placement = Placement::resolve(position_m, rotation_deg, scale, &field)?;
     let mesh = read_quad([rectangle.corner_m, rectangle.edge_u_m, rectangle.edge_v_m], &field)?;
     Ok(Part {
         name: name.to_owned(),
@@ -201,7 +203,7 @@ fn read_rectangle<'a>(
         material,
         sides: Sides::Front,
         mesh,
-        placement: Placement::IDENTITY,
+        placement,
         emitter: Some(Emitter {
             strength: Strength::Power(power),
             faces: vec![EmitterFace::Parallelogram([0, 1, 3])],

@@ -8,6 +8,7 @@ mod objects;
 mod settings;
 
 use crate::{
+    animation,
     bake::{self, Baked, BakedEmitter, Part, Strength},
     bvh::SceneBvh,
     config::{Document, Field, LightConfig, SceneConfig},
@@ -17,6 +18,7 @@ use crate::{
     scene::{LightId, ObjectId, Scene, SceneLight},
 };
 use glam::DVec3;
+pub(crate) use lights::not_one_of;
 use materials::Materials;
 use photonstream_shading::{Light, LightShape};
 use std::{collections::BTreeMap, f64::consts::PI, path::Path, sync::Arc};
@@ -57,6 +59,9 @@ impl SceneConfig {
         let document = std::mem::take(&mut self.document);
         let root = Field::root(&document);
         let name = self.name.get_or_insert_with(|| stem(&document)).clone();
+        let animation = animation::read(&mut self, &root)?;
+        // A scene is loaded as it is at its beginning.
+        animation.write(0.0, &mut self);
         let streaming = settings::streaming(&mut self.streaming, &root.key("streaming"))?;
         let render = settings::render(&mut self.render, &root.key("render"))?;
         let mut materials = Materials::read(&self.material, &root.key("material"))?;
@@ -92,7 +97,8 @@ impl SceneConfig {
 
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
         let bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
-        let features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
+        let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
+        (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents);
         Ok(Scene {
             name,
@@ -110,6 +116,7 @@ impl SceneConfig {
             bounds,
             features,
             notices,
+            animation: Arc::new(animation),
             rest_meshes: rest_meshes.into(),
             poses,
         })

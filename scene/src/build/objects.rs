@@ -2,12 +2,12 @@
 
 use super::{
     Inputs, check_name, imported,
-    lights::{not_one_shape, read_quad},
+    lights::{not_one_of, read_quad},
     materials::Materials,
 };
 use crate::{
     bake::Part,
-    config::{BoxConfig, Field, ObjectConfig, QuadConfig, SphereConfig, TorusKnotConfig},
+    config::{BoxConfig, Field, ObjectConfig, QuadConfig, SphereConfig, TorusKnotConfig, Vector},
     error::SceneError,
     import::AssetRoots,
     placement::Placement,
@@ -31,7 +31,8 @@ pub(super) fn read<'a>(
             materials.check(material, &field.key("material"))?;
         }
         let sides = *object.sides.get_or_insert(Sides::Front);
-        let placement = Placement::resolve(object, &field)?;
+        let ObjectConfig { position_m, rotation_deg, scale, .. } = object;
+        let placement = Placement::resolve(position_m, rotation_deg, scale, &field)?;
         let Some(mesh) = primitive(object, &field)? else {
             let mut context = imported::Context { field: &field, roots, materials, inputs, notices };
             imported::read(name, object, placement, &mut context)?;
@@ -55,14 +56,16 @@ fn primitive(object: &mut ObjectConfig, field: &Field<'_>) -> Result<Option<Mesh
         ("obj", obj.is_some()),
     ];
     if given.iter().filter(|(_, given)| *given).count() != 1 {
-        return Err(not_one_shape(field, &given));
+        return Err(not_one_of(field, &given));
     }
     if let Some(QuadConfig { corner_m, edge_u_m, edge_v_m }) = quad {
         return read_quad([*corner_m, *edge_u_m, *edge_v_m], &field.key("quad")).map(Some);
     }
-    if let Some(BoxConfig { size_m }) = cuboid {
-        let size = field.key("box").key("size_m").lengths(*size_m)?;
-        return Ok(Some(crate::primitives::cuboid(size)));
+    if let Some(BoxConfig { size_m, centre_m }) = cuboid {
+        let field = field.key("box");
+        let size = field.key("size_m").lengths(*size_m)?;
+        let centre = field.key("centre_m").metres(*centre_m.get_or_insert(Vector::default()))?;
+        return Ok(Some(crate::primitives::cuboid(size, centre)));
     }
     if let Some(shape) = sphere {
         return read_sphere(shape, &field.key("sphere")).map(Some);

@@ -20,6 +20,13 @@ pub(super) fn streaming(
     let placement_scale = *config.placement_scale.get_or_insert(widen(d.placement_scale));
     let publish_period_ms = *config.publish_period_ms.get_or_insert(widen(d.publish_period_ms));
     let light_columns = *config.light_columns.get_or_insert(d.light_columns);
+    let target_error = *config.target_error.get_or_insert(d.target_error);
+    let latency_ms = *config.latency_ms.get_or_insert(d.latency_ms);
+    if let Some(step) = config.fixed_step_ms {
+        field
+            .key("fixed_step_ms")
+            .number(step, "a time above 0, up to 60000 ms", |x| x > 0.0 && x <= 60_000.0)?;
+    }
     if i64::try_from(seed).is_err() {
         return Err(field.key("seed").invalid(
             seed,
@@ -46,6 +53,15 @@ pub(super) fn streaming(
         )? as f32,
         threads: config.threads,
         light_columns: field.key("light_columns").count(light_columns, 1..=1024)?,
+        fixed_step_ms: config.fixed_step_ms,
+        target_error: field.key("target_error").number(
+            target_error,
+            "a relative error from 0 to 1",
+            |x| (0.0..=1.0).contains(&x),
+        )?,
+        latency_ms: field
+            .key("latency_ms")
+            .number(latency_ms, "a time from 0 to 60000 ms", |x| (0.0..=60_000.0).contains(&x))?,
     })
 }
 

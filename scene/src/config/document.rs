@@ -32,14 +32,23 @@ impl Document {
         let mut table = root.get_ref();
         let mut offset = None;
         for key in keys {
-            let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == key) else { break };
-            match value.get_ref() {
-                DeValue::Table(inner) => {
-                    offset = Some(name.span().start);
-                    table = inner;
+            let find = |key: &str| table.iter().find(|(name, _)| name.get_ref() == key);
+            if let Some((name, value)) = find(key) {
+                match value.get_ref() {
+                    DeValue::Table(inner) => {
+                        offset = Some(name.span().start);
+                        table = inner;
+                    }
+                    _ => return Some(value.span().start),
                 }
-                _ => return Some(value.span().start),
+                continue;
             }
+            let Some((name, index)) = element(key) else { break };
+            let Some((_, array)) = find(name) else { break };
+            let Some(value) = array.get_ref().as_array().and_then(|array| array.get(index)) else { break };
+            offset = Some(value.span().start);
+            let Some(inner) = value.get_ref().as_table() else { break };
+            table = inner;
         }
         offset
     }
@@ -50,6 +59,12 @@ impl Document {
         let mut path = Vec::new();
         find_in_table(root.get_ref(), span, &mut path).then_some(path)
     }
+}
+
+/// Name and number of `name[number]`.
+fn element(key: &str) -> Option<(&str, usize)> {
+    let (name, number) = key.strip_suffix(']')?.rsplit_once('[')?;
+    Some((name, number.parse().ok()?))
 }
 
 fn find_in_table(table: &DeTable<'_>, span: &Range<usize>, path: &mut Vec<String>) -> bool {
@@ -67,10 +82,18 @@ fn find_in_table(table: &DeTable<'_>, span: &Range<usize>, path: &mut Vec<String
 fn find_in_value(value: &DeValue<'_>, span: &Range<usize>, path: &mut Vec<String>) -> bool {
     match value {
         DeValue::Table(table) => find_in_table(table, span, path),
-        // Elements of arrays go by the name of the array.
-        DeValue::Array(array) => {
-            array.iter().any(|v| v.span() == *span || find_in_value(v.get_ref(), span, path))
-        }
+        // Elements of arrays go by the name of the array, tables among them by their number too.
+        DeValue::Array(array) => array.iter().enumerate().any(|(number, v)| {
+            let name = path.pop().unwrap_or_default();
+            let is_table = v.get_ref().as_table().is_some();
+            path.push(if is_table { format!("{name}[{number}]") } else { name.clone() });
+            if v.span() == *span || find_in_value(v.get_ref(), span, path) {
+                return true;
+            }
+            path.pop();
+            path.push(name);
+            false
+        }),
         _ => false,
     }
 }
@@ -91,6 +114,14 @@ impl<'a> Field<'a> {
     pub(crate) fn key(&self, key: &str) -> Self {
         let mut keys = self.keys.clone();
         keys.push(key.to_owned());
+        Self { document: self.document, keys }
+    }
+
+    /// Element `number` of this array, counted from 0.
+    pub(crate) fn element(&self, number: usize) -> Self {
+        let mut keys = self.keys.clone();
+        let name = keys.pop().unwrap_or_default();
+        keys.push(format!("{name}[{number}]"));
         Self { document: self.document, keys }
     }
 

@@ -18,7 +18,7 @@ fn every_key() -> SceneConfig {
         rotation_deg: Some(v),
         scale: c,
         quad: Some(QuadConfig { corner_m: v, edge_u_m: v, edge_v_m: v }),
-        cuboid: Some(BoxConfig { size_m: v }),
+        cuboid: Some(BoxConfig { size_m: v, centre_m: Some(v) }),
         sphere: Some(SphereConfig { radius_m: 1.0, segments: Some(1) }),
         torus_knot: Some(TorusKnotConfig {
             p: Some(1),
@@ -42,7 +42,25 @@ fn every_key() -> SceneConfig {
         }),
         point: Some(PointConfig { position_m: v }),
         directional: Some(DirectionalConfig { direction: v }),
-        rectangle: Some(RectangleConfig { corner_m: v, edge_u_m: v, edge_v_m: v, albedo: c }),
+        rectangle: Some(RectangleConfig {
+            corner_m: v,
+            edge_u_m: v,
+            edge_v_m: v,
+            albedo: c,
+            position_m: Some(v),
+            rotation_deg: Some(v),
+            scale: c,
+        }),
+    };
+    let animation = AnimationConfig {
+        light: Some("l".into()),
+        object: Some("o".into()),
+        property: Some(AnimatedProperty::Position),
+        times_s: Some(vec![0.0, 1.5]),
+        values: Some(vec![AnimatedValue::One(1.0), AnimatedValue::Three([1.0, 2.0, 3.0])]),
+        interpolation: Some(Interpolation::Smooth),
+        orbit: Some(OrbitConfig { centre_m: v, axis: v, radius_m: 1.0, period_s: 1.0, phase_deg: Some(1.0) }),
+        repeat: Some(Repeat::Bounce),
     };
     SceneConfig {
         name: Some("n".into()),
@@ -51,6 +69,7 @@ fn every_key() -> SceneConfig {
         material: [("NAME".into(), MaterialConfig { albedo: OneOrThree([0.5; 3]) })].into(),
         object: [("NAME".into(), object)].into(),
         light: [("NAME".into(), light)].into(),
+        animation: vec![animation.clone(), animation],
         streaming: StreamingConfig {
             vsls: Some(1),
             pool_paths: Some(1),
@@ -60,6 +79,9 @@ fn every_key() -> SceneConfig {
             publish_period_ms: Some(1.0),
             threads: Some(1),
             light_columns: Some(1),
+            fixed_step_ms: Some(1.0),
+            target_error: Some(1.0),
+            latency_ms: Some(1.0),
         },
         render: RenderConfig {
             width_px: Some(1),
@@ -80,6 +102,10 @@ fn leaves(value: &Value, path: &str, out: &mut BTreeSet<String>) {
         Value::Table(table) => table.iter().for_each(|(key, value)| {
             leaves(value, &if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, out)
         }),
+        // Arrays of tables; those of values are leaves.
+        Value::Array(array) if array.iter().all(Value::is_table) => {
+            array.iter().for_each(|value| leaves(value, &format!("{path}[]"), out));
+        }
         _ => _ = out.insert(path.to_owned()),
     }
 }
@@ -120,6 +146,12 @@ fn documented_defaults_are_those_of_a_resolved_scene() {
         object.a = { material = "m", sphere = { radius_m = 1 } }
         object.b = { material = "m", torus-knot = { radius_m = 1, tube_radius_m = 0.1 } }
         object.c = { obj = { path = "a.obj" } }
+        animation = [
+            { light = "f", property = "position_m", orbit = { centre_m = [0, 1, 0], axis = [0, 1, 0], radius_m = 1, period_s = 1 } },
+            { object = "b", property = "position_m", times_s = [0], values = [[0, 0, 0]] },
+        ]
+        object.e = { material = "m", box = { size_m = [1, 1, 1] } }
+        light.f = { power_w = 1, point = { position_m = [0, 1, 0] } }
         light.d = { power_w = 1, rectangle = { corner_m = [0, 3, 0], edge_u_m = [1, 0, 0], edge_v_m = [0, 0, 1] } }
     "#;
     let config = SceneConfig::from_text(text, &folder.path().join("scene.toml")).unwrap();
@@ -129,14 +161,15 @@ fn documented_defaults_are_those_of_a_resolved_scene() {
     for (key, default) in documented() {
         let Some(default) = default.strip_prefix('`').and_then(|d| d.strip_suffix('`')) else { continue };
         let expected: Table = format!("value = {default}").parse().unwrap();
-        let (table, rest) = key.split_once(".NAME.").map_or((key.as_str(), None), |(t, r)| (t, Some(r)));
         let mut found = Vec::new();
-        match rest {
-            None => found.extend(look_up(&Value::Table(resolved.clone()), table)),
-            Some(rest) => {
-                let named = resolved[table].as_table().unwrap();
-                found.extend(named.values().filter_map(|value| look_up(value, rest)));
-            }
+        if let Some((table, rest)) = key.split_once(".NAME.") {
+            let named = resolved[table].as_table().unwrap();
+            found.extend(named.values().filter_map(|value| look_up(value, rest)));
+        } else if let Some((array, rest)) = key.split_once("[].") {
+            let tables = resolved[array].as_array().unwrap();
+            found.extend(tables.iter().filter_map(|value| look_up(value, rest)));
+        } else {
+            found.extend(look_up(&Value::Table(resolved.clone()), &key));
         }
         assert!(!found.is_empty(), "{key} is not resolved");
         assert!(

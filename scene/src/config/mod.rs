@@ -1,5 +1,6 @@
 //! Gathers what a user writes in a scene file, before it is validated: one struct per table, one field per key.
 
+mod animation;
 mod decode;
 mod document;
 mod domain;
@@ -7,6 +8,7 @@ mod domain;
 mod keys;
 mod values;
 
+pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
 pub use domain::{MAX_LENGTH_M, MAX_POWER};
 pub use values::{OneOrThree, Vector};
@@ -38,6 +40,9 @@ pub struct SceneConfig {
     /// Light sources by name.
     #[serde(default)]
     pub light: BTreeMap<String, LightConfig>,
+    /// What moves and dims lights and objects, in any order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub animation: Vec<AnimationConfig>,
     /// Settings of the simulation.
     #[serde(default)]
     pub streaming: StreamingConfig,
@@ -87,7 +92,7 @@ pub struct ObjectConfig {
     pub scale: Option<OneOrThree>,
     /// A parallelogram.
     pub quad: Option<QuadConfig>,
-    /// A cuboid centred at its origin.
+    /// A cuboid.
     #[serde(rename = "box")]
     pub cuboid: Option<BoxConfig>,
     /// A sphere centred at its origin.
@@ -111,12 +116,14 @@ pub struct QuadConfig {
     pub edge_v_m: Vector,
 }
 
-/// `box`: a cuboid centred at its origin.
+/// `box`: a cuboid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoxConfig {
     /// Lengths of its edges along x, y and z, m.
     pub size_m: Vector,
+    /// Where its middle is in the object's own coordinates, m; default their origin. The object turns about that origin.
+    pub centre_m: Option<Vector>,
 }
 
 /// `sphere`: a tessellated sphere centred at its origin, its corners on the radius.
@@ -219,6 +226,12 @@ pub struct RectangleConfig {
     pub edge_v_m: Vector,
     /// Share of the arriving light that its front reflects; default 0.
     pub albedo: Option<OneOrThree>,
+    /// Where the origin of corner and edges is put, m.
+    pub position_m: Option<Vector>,
+    /// Turns about that origin, as that of an object.
+    pub rotation_deg: Option<Vector>,
+    /// Stretches it before it is turned; its power stays.
+    pub scale: Option<OneOrThree>,
 }
 
 /// `[streaming]`: settings of the simulation; see [`crate::StreamingSettings`].
@@ -242,6 +255,12 @@ pub struct StreamingConfig {
     pub threads: Option<u32>,
     /// Lights beyond this number share one column of flux.
     pub light_columns: Option<u32>,
+    /// Simulated time from one published frame to the next; default: as much as passes on the clock.
+    pub fixed_step_ms: Option<f64>,
+    /// Relative standard error of the flux at which refinement beyond the pool stops.
+    pub target_error: Option<f64>,
+    /// Time within which a change shall be traced.
+    pub latency_ms: Option<f64>,
 }
 
 /// `[render]`: default settings of the renderers; see [`crate::RenderSettings`].

@@ -46,55 +46,69 @@ impl Serialize for OneOrThree {
 
 impl<'de> Deserialize<'de> for Vector {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Components { one: false }).map(Self)
+        deserializer.deserialize_any(Components { one: None, three: Self })
     }
 }
 
 impl<'de> Deserialize<'de> for OneOrThree {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Components { one: true }).map(Self)
+        one_or_three(deserializer, |value| Self([value; 3]), Self)
     }
 }
 
-struct Components {
-    one: bool,
+/// Reads one number or three, into what `one` and `three` make of them.
+pub(super) fn one_or_three<'de, T, D: Deserializer<'de>>(
+    deserializer: D,
+    one: fn(f64) -> T,
+    three: fn([f64; 3]) -> T,
+) -> Result<T, D::Error> {
+    deserializer.deserialize_any(Components { one: Some(one), three })
 }
 
-impl<'de> de::Visitor<'de> for Components {
-    type Value = [f64; 3];
+/// Three numbers, or one where that has a meaning.
+struct Components<T> {
+    one: Option<fn(f64) -> T>,
+    three: fn([f64; 3]) -> T,
+}
+
+impl<'de, T> de::Visitor<'de> for Components<T> {
+    type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.one { "a number or three numbers [a, b, c]" } else { "three numbers [x, y, z]" })
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<[f64; 3], E> {
-        if self.one { Ok([value; 3]) } else { Err(E::invalid_type(de::Unexpected::Float(value), &self)) }
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<[f64; 3], E> {
-        if self.one {
-            Ok([value as f64; 3])
+        f.write_str(if self.one.is_some() {
+            "a number or three numbers [a, b, c]"
         } else {
-            Err(E::invalid_type(de::Unexpected::Signed(value), &self))
-        }
+            "three numbers [x, y, z]"
+        })
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<T, E> {
+        self.one.map(|one| one(value)).ok_or_else(|| E::invalid_type(de::Unexpected::Float(value), &self))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<T, E> {
+        self.one
+            .map(|one| one(value as f64))
+            .ok_or_else(|| E::invalid_type(de::Unexpected::Signed(value), &self))
     }
 
     // TOML has signed integers only, JSON both.
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<[f64; 3], E> {
-        if self.one {
-            Ok([value as f64; 3])
-        } else {
-            Err(E::invalid_type(de::Unexpected::Unsigned(value), &self))
-        }
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<T, E> {
+        self.one
+            .map(|one| one(value as f64))
+            .ok_or_else(|| E::invalid_type(de::Unexpected::Unsigned(value), &self))
     }
 
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<[f64; 3], A::Error> {
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<T, A::Error> {
         let mut values = Vec::with_capacity(3);
         while let Some(value) = seq.next_element::<f64>()? {
             values.push(value);
         }
         let count = values.len();
-        values.try_into().map_err(|_| de::Error::invalid_length(count, &self))
+        match values.try_into() {
+            Ok(values) => Ok((self.three)(values)),
+            Err(_) => Err(de::Error::invalid_length(count, &self)),
+        }
     }
 }
 
@@ -108,6 +122,9 @@ macro_rules! impl_named {
 }
 
 impl_named!(
+    super::AnimatedProperty,
+    super::Interpolation,
+    super::Repeat,
     crate::scene::Sides,
     crate::settings::Sampling,
     crate::settings::Visibility,

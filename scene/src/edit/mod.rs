@@ -1,6 +1,7 @@
-//! Turns edits of lights and objects into a new version of a scene, which shares all that they leave alone.
+//! Turns edits of lights, objects and materials into a new version of a scene, which shares all that they leave alone.
 
 mod light;
+mod material;
 mod object;
 mod values;
 
@@ -9,8 +10,8 @@ use crate::{
     build::area_light,
     config::{Document, Field, MAX_LENGTH_M},
     error::{SceneError, nearest},
-    pose::{self, Pose},
-    scene::{LightId, ObjectId, Scene},
+    pose::{self, Pose, RestMesh},
+    scene::{Geometry, LightId, MaterialId, Object, ObjectId, Scene},
 };
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use photonstream_shading::{Light, surface};
@@ -77,6 +78,15 @@ impl SceneEdit {
         light::set(&mut self.scene, name, values)
     }
 
+    /// Changes the material called `name` by the key `albedo` of its table in a config. Materials that imports and
+    /// rectangles have brought along, `NAME/material` and `NAME/emitter`, may be changed too.
+    ///
+    /// # Errors
+    /// If there is no such material or key, or the albedo is not within [0, 1]; nothing is changed then.
+    pub fn set_material(&mut self, name: &str, values: &Values) -> Result<MaterialId, SceneError> {
+        material::set(&mut self.scene, name, values)
+    }
+
     /// Moves an object; see [`Scene::with_object_placed`].
     ///
     /// # Errors
@@ -92,8 +102,9 @@ impl SceneEdit {
                 "choose another object",
             ));
         };
-        if object.world_from_rest == world_from_rest {
-            self.poses.insert(id, self.scene.poses[id.0 as usize]);
+        let (now, current) = (self.scene.poses[id.0 as usize], self.pose(id));
+        if object.world_from_rest == world_from_rest && now.scale == current.scale {
+            self.poses.insert(id, now);
             return Ok(());
         }
         let field = field.key(&object.name).key("world_from_rest");
@@ -107,14 +118,19 @@ impl SceneEdit {
             ));
         }
         let mesh = &self.scene.rest_meshes[id.0 as usize];
+        let centre = mesh.centre(current.scale);
         // Where it was loaded, exactly: a motion alone gives a pose to the rounding of f64.
-        let back = mesh.loaded.world_from_rest(mesh.centre) == world_from_rest;
-        let pose = if back { mesh.loaded } else { Pose::from_motion(&world_from_rest, mesh.centre) };
+        let back =
+            mesh.loaded.scale == current.scale && mesh.loaded.world_from_rest(centre) == world_from_rest;
+        let pose = if back { mesh.loaded } else { current.moved(&world_from_rest, centre) };
         self.pose_object(id, pose, &field)
     }
 
-    /// Moves the object called `name`, or all objects that the import `name` has made, by the keys `position_m` and
-    /// `rotation_deg` of a config; what is not given stays. Positions are in the config's coordinates.
+    /// Moves the object called `name`, or all objects that the import `name` has made, by the keys `position_m`,
+    /// `rotation_deg` and `scale` of a config; what is not given stays. Positions are in the config's coordinates.
+    ///
+    /// A scale changes the object at rest: [`crate::Geometry::rest_vertices`], and [`crate::Geometry::triangles`] where
+    /// it turns a mesh inside out, are others then.
     ///
     /// # Errors
     /// If there is no such object or key, or a value is not valid; nothing is changed then.
@@ -134,15 +150,16 @@ impl SceneEdit {
             return scene;
         }
         let geometry = Arc::make_mut(&mut scene.geometry);
+        resize(geometry, &scene.rest_meshes, &scene.poses, &scene.objects, &moves);
         let triangles = Arc::clone(&geometry.triangles);
         for (id, pose) in &moves {
             let mesh = &scene.rest_meshes[id.0 as usize];
             let object = &mut scene.objects[id.0 as usize];
-            object.world_from_rest = pose.world_from_rest(mesh.centre);
+            object.world_from_rest = pose.world_from_rest(mesh.centre(pose.scale));
             scene.poses[id.0 as usize] = *pose;
             let range = mesh.vertices.start as usize..mesh.vertices.end as usize;
-            for (vertex, &scaled) in geometry.vertices[range].iter_mut().zip(&mesh.scaled) {
-                *vertex = pose::round(pose.apply(scaled));
+            for (vertex, &own) in geometry.vertices[range].iter_mut().zip(&mesh.own) {
+                *vertex = pose::round(pose.apply(own));
             }
             for triangle in object.triangles.clone() {
                 geometry.normals[triangle as usize] = surface::normal(geometry.triangle(triangle))
@@ -155,7 +172,8 @@ impl SceneEdit {
         for light in &mut scene.lights {
             let (Some(object), Some((face, strength))) = (light.object, light.face) else { continue };
             if moves.iter().any(|(id, _)| *id == object) {
-                let shape = scene.rest_meshes[object.0 as usize].light_shape(face, &scene.geometry.vertices);
+                let (mesh, pose) = (&scene.rest_meshes[object.0 as usize], &scene.poses[object.0 as usize]);
+                let shape = mesh.light_shape(face, pose, &scene.geometry.vertices);
                 light.light = area_light(shape, strength);
                 if !light.enabled {
                     light.light.power = Vec3::ZERO;
@@ -172,7 +190,7 @@ impl SceneEdit {
 
     fn pose_object(&mut self, id: ObjectId, pose: Pose, field: &Field<'_>) -> Result<(), SceneError> {
         let mesh = &self.scene.rest_meshes[id.0 as usize];
-        let farthest = mesh.scaled.iter().map(|&p| pose.apply(p)).find(|p| is_far(*p));
+        let farthest = mesh.own.iter().map(|&p| pose.apply(p)).find(|p| is_far(*p));
         if let Some(world) = farthest {
             return Err(field.invalid(
                 format!("a vertex {world} m from the scene's origin"),
@@ -182,6 +200,41 @@ impl SceneEdit {
         }
         self.poses.insert(id, pose);
         Ok(())
+    }
+}
+
+/// Gives objects of another size their vertices at rest, and those newly mirrored, or no longer, their other winding;
+/// what no object needs to change stays shared.
+fn resize(
+    geometry: &mut Geometry,
+    meshes: &[RestMesh],
+    poses: &[Pose],
+    objects: &[Object],
+    moves: &[(ObjectId, Pose)],
+) {
+    let (mut rest, mut triangles) = (None, None);
+    for (ObjectId(id), pose) in moves {
+        let (id, before) = (*id as usize, &poses[*id as usize]);
+        if pose.scale == before.scale {
+            continue;
+        }
+        let (mesh, centre) = (&meshes[id], meshes[id].centre(pose.scale));
+        let range = mesh.vertices.start as usize..mesh.vertices.end as usize;
+        let rest = rest.get_or_insert_with(|| geometry.rest_vertices.to_vec());
+        for (vertex, &own) in rest[range].iter_mut().zip(&mesh.own) {
+            *vertex = RestMesh::rest_vertex(own, pose.scale, centre);
+        }
+        if pose.is_mirrored() != before.is_mirrored() {
+            let triangles = triangles.get_or_insert_with(|| geometry.triangles.to_vec());
+            let range = objects[id].triangles.start as usize..objects[id].triangles.end as usize;
+            triangles[range].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+    }
+    if let Some(rest) = rest {
+        geometry.rest_vertices = rest.into();
+    }
+    if let Some(triangles) = triangles {
+        geometry.triangles = triangles.into();
     }
 }
 

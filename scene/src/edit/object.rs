@@ -5,14 +5,14 @@ use super::{
     values::{Keys, Values},
 };
 use crate::{
-    config::{Document, Field, Vector},
+    config::{Document, Field, OneOrThree, Vector},
     error::SceneError,
     placement::rotation,
     pose,
     scene::ObjectId,
 };
 
-const KEYS: [&str; 2] = ["position_m", "rotation_deg"];
+const KEYS: [&str; 3] = ["position_m", "rotation_deg", "scale"];
 
 pub(super) fn set(edit: &mut SceneEdit, name: &str, values: &Values) -> Result<Vec<ObjectId>, SceneError> {
     let document = Document::default();
@@ -32,10 +32,15 @@ pub(super) fn set(edit: &mut SceneEdit, name: &str, values: &Values) -> Result<V
         .take::<Vector>("rotation_deg", "three numbers [x, y, z]", &field)?
         .map(|value| field.key("rotation_deg").degrees(value))
         .transpose()?;
+    let scale = keys
+        .take::<OneOrThree>("scale", "a number or three numbers [x, y, z]", &field)?
+        .map(|value| field.key("scale").scale(value))
+        .transpose()?;
     let before = edit.poses.clone();
     for &id in &ids {
         let mut pose = edit.pose(id);
         pose.offset = position.map_or(pose.offset, |p| pose::offset(p, edit.scene.origin_m));
+        pose.scale = scale.unwrap_or(pose.scale);
         pose.rotation = turn.map_or(pose.rotation, rotation);
         if let Err(error) = edit.pose_object(id, pose, &field) {
             edit.poses = before;
@@ -50,10 +55,9 @@ fn called(edit: &SceneEdit, name: &str) -> Vec<ObjectId> {
     if let Some(id) = edit.scene.object(name) {
         return vec![id];
     }
-    let is_part = |object: &str| object.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'));
     (0u32..)
         .zip(&edit.scene.objects)
-        .filter(|(_, object)| is_part(&object.name))
+        .filter(|(_, object)| object.is_called(name))
         .map(|(id, _)| ObjectId(id))
         .collect()
 }

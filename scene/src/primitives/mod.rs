@@ -97,10 +97,13 @@ mod tests {
 
     #[test]
     fn cuboid_is_closed_with_its_area_and_volume() {
-        let mesh = cuboid(DVec3::new(1.0, 2.0, 3.0));
-        assert_closed(&mesh);
-        assert_eq!(mesh.triangles.len(), 12);
-        assert_eq!(area_and_volume(&mesh), (22.0, 6.0));
+        for centre in [DVec3::ZERO, DVec3::new(4.0, -2.0, 8.0)] {
+            let mesh = cuboid(DVec3::new(1.0, 2.0, 3.0), centre);
+            assert_closed(&mesh);
+            assert_eq!(mesh.triangles.len(), 12);
+            assert_eq!(area_and_volume(&mesh), (22.0, 6.0));
+            assert_eq!(mesh.vertices.iter().sum::<DVec3>() / 8.0, centre);
+        }
     }
 
     /// Inscribed: area and volume grow towards the sphere's with an error of order 1/n².
