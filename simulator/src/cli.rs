@@ -2,7 +2,7 @@
 
 use crate::{
     error::SimulatorError,
-    service::{self, Options, Summary},
+    service::{self, ConfigSource, Options, Summary},
     simulation::Simulation,
 };
 use photonstream_protocol::ChannelName;
@@ -24,6 +24,9 @@ pub struct Args {
     /// Rest after this many paths
     #[arg(long, value_name = "PATHS")]
     pub after: Option<u64>,
+    /// Load the config once: later changes of the file change nothing
+    #[arg(long)]
+    pub no_watch: bool,
     /// Settings that override the config's
     #[command(flatten)]
     pub overrides: Overrides,
@@ -81,9 +84,8 @@ impl Overrides {
 pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
     let stop = stop_on_signals()?;
     let begun = Instant::now();
-    let mut config = SceneConfig::from_file(&args.config)?;
-    args.overrides.apply(&mut config);
-    let scene = config.build()?;
+    let source = ConfigSource { path: args.config.clone(), overrides: args.overrides.clone() };
+    let scene = source.load()?;
     for notice in &scene.notices {
         tracing::warn!("{}: {notice}", scene.name);
     }
@@ -104,6 +106,7 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         channel: args.channel.clone(),
         threads: args.threads.map(|t| t as usize),
         after_paths: args.after,
+        config: (!args.no_watch).then_some(source),
     };
     service::run(simulation, &options, &stop)
 }

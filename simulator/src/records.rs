@@ -34,6 +34,14 @@ pub fn write_flux(records: &mut [VslRecord], readings: impl Iterator<Item = Flux
     }
 }
 
+/// The relative standard error of a light's flux in the mean over lights, weighted by flux; 0 where there is no light.
+pub fn relative_error(records: &[VslRecord]) -> f64 {
+    let sum = |value: &dyn Fn(&VslRecord) -> f64| records.iter().map(value).sum::<f64>();
+    let flux = sum(&|r| r.flux.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0);
+    let errors = sum(&|r| f64::from(r.standard_error));
+    if flux > 0.0 { errors / flux } else { 0.0 }
+}
+
 /// One record for each object: its motion from rest space to the scene's space.
 pub fn object_records(scene: &Scene) -> Vec<ObjectRecord> {
     (0u32..)

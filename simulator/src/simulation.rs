@@ -38,6 +38,13 @@ impl Simulation {
         Self { scene, placement: Arc::new(placement), owners, emitters, tracer }
     }
 
+    /// Whether the virtual surface lights of `scene` are those of this simulation: a version of its scene in which no
+    /// object has another mesh, with the same settings.
+    pub fn has_lights_of(&self, scene: &Scene) -> bool {
+        Arc::ptr_eq(&self.scene.geometry.rest_vertices, &scene.geometry.rest_vertices)
+            && self.scene.streaming == scene.streaming
+    }
+
     /// The same simulation in an edited version of its scene: the virtual surface lights ride with their objects, and the
     /// pool is split as before, whatever power the lights have now.
     pub fn with_scene(&self, scene: Arc<Scene>) -> Self {

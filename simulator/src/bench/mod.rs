@@ -75,8 +75,12 @@ fn stream(simulation: &Simulation, threads: usize, time: Duration) -> Result<Thr
     let mut scene = Scene::clone(&simulation.scene);
     scene.streaming.sampling = photonstream_scene::Sampling::Fresh;
     let simulation = Simulation { scene: Arc::new(scene), ..simulation.clone() };
-    let options =
-        service::Options { channel: exchange::channel("stream")?, threads: Some(threads), after_paths: None };
+    let options = service::Options {
+        channel: exchange::channel("stream")?,
+        threads: Some(threads),
+        after_paths: None,
+        config: None,
+    };
     let (stop, stopped) = flume::bounded(1);
     let timer = service::spawn("timer", move || {
         std::thread::sleep(time);

@@ -207,10 +207,16 @@ impl Ledger {
 
     /// Takes slots out of use until no more than `budget` of them have to be traced.
     fn fit(&mut self, budget: u32) {
-        let open = self.empty + self.stale_paths;
-        if open <= budget {
-            return;
+        // The first slots of a light may have more than their share of stale paths.
+        let mut before = u32::MAX;
+        while self.empty + self.stale_paths > budget && self.active_slots() < before {
+            before = self.active_slots();
+            self.shrink(budget);
         }
+    }
+
+    fn shrink(&mut self, budget: u32) {
+        let open = self.empty + self.stale_paths;
         let share = f64::from(budget) / f64::from(open);
         for index in 0..self.active.len() {
             let light = &self.emitters.lights[index];

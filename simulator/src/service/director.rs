@@ -1,17 +1,19 @@
 //! Turns requests and signals into what the actors do, from their start to their end.
 
 use super::{
-    Farewell,
-    edits::Edits,
+    ConfigSource, Farewell,
+    clock::Clock,
+    edits::{self, Edits},
     ledger_actor::{Change, LedgerActor, ToLedger, Version},
     publisher_actor::{PlacedRecords, PublisherActor, RECORD_SETS, Still},
+    settings::{self, SettingsError},
     spawn, tracer_actor,
+    watcher::{self, News},
 };
 use crate::{counters::Counters, error::SimulatorError, records, simulation::Simulation};
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
-    ChannelName, ControlServer, Incoming, NOTICE_CAPACITY, ProtocolError, Publisher, Reply, Request,
-    SegmentSpec, monotonic_ns,
+    ChannelName, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, monotonic_ns,
 };
 use photonstream_scene::Scene;
 use serde::Serialize;
@@ -33,6 +35,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Rest after this many paths.
     pub after_paths: Option<u64>,
+    /// Where the scene comes from: it is loaded again when it changes there. `None`: it stays.
+    pub config: Option<ConfigSource>,
 }
 
 /// Why a simulation ended.
@@ -78,6 +82,11 @@ pub fn run(
 enum Event {
     Stop,
     Request(Incoming),
+    News(News),
+    /// The light of a version was shown whole.
+    Settled(u64),
+    /// It is time to look at the animation.
+    Tick,
     ActorGone,
 }
 
@@ -86,6 +95,14 @@ struct Director {
     /// The newest version.
     simulation: Simulation,
     still: Arc<Still>,
+    clock: Clock,
+    config: Option<ConfigSource>,
+    news: flume::Receiver<News>,
+    /// Ends the watcher when it is dropped.
+    watching: Option<(flume::Sender<()>, JoinHandle<()>)>,
+    settled: flume::Receiver<u64>,
+    /// Versions of the scene after the first.
+    versions: u64,
     started: Instant,
     server: ControlServer,
     to_ledger: flume::Sender<ToLedger>,
@@ -106,17 +123,9 @@ impl Director {
             .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
             .max(1);
         let place = records::vsl_records(&scene, &simulation.placement);
-        let place = PlacedRecords { records: place, version: 0 };
+        let place = PlacedRecords { records: place, version: 0, placement: 0 };
         let still = Arc::new(Still::new(&scene));
-        let spec = SegmentSpec {
-            vsl_capacity: place.records.len().max(1) as u32,
-            object_capacity: still.objects.len().max(1) as u32,
-            light_capacity: still.lights.len().max(1) as u32,
-            scene_text_capacity: still.scene_text.len() as u32,
-            notice_capacity: NOTICE_CAPACITY,
-            scene_hash: scene.hash,
-            slots: 3,
-        };
+        let spec = still.spec(place.records.len(), None);
         let publisher = Publisher::create(&options.channel, &spec)?;
         let server = ControlServer::start(&publisher)?;
 
@@ -127,6 +136,8 @@ impl Director {
         for records in std::iter::repeat_n(place, RECORD_SETS) {
             emptied.push(records).expect("invariant: the queue has room for all sets of records");
         }
+        // At most one message for each version, which this thread makes.
+        let (settled_sender, settled) = flume::unbounded();
         let (farewells, actor_gone) = flume::bounded(1);
         let tracers = (0..threads)
             .map(|_| {
@@ -163,6 +174,7 @@ impl Director {
             snapshots: snapshot_sender,
             emptied,
             after_paths: options.after_paths,
+            settled: settled_sender,
         };
         let ledger = {
             let farewell = Farewell(farewells.clone());
@@ -171,8 +183,23 @@ impl Director {
                 actor.run()
             })?
         };
+        let (tell, news) = flume::bounded(1);
+        let watching = match &options.config {
+            Some(source) => {
+                let (stop, stopped) = flume::bounded(1);
+                Some((stop, watcher::start(source.clone(), &scene, tell, stopped)?))
+            }
+            None => None,
+        };
+        let period = publish_period(&scene);
         Ok(Self {
             scene_name: scene.name.clone(),
+            clock: Clock::new(scene.streaming.fixed_step_ms, period),
+            config: options.config.clone(),
+            news,
+            watching,
+            settled,
+            versions: 0,
             simulation,
             still,
             started: Instant::now(),
@@ -190,15 +217,33 @@ impl Director {
     /// Until it is time to end; `None` if an actor ended before.
     fn direct(&mut self, stop: &flume::Receiver<()>) -> Option<Ending> {
         loop {
-            let event = flume::Selector::new()
+            let selector = flume::Selector::new()
                 .recv(stop, |_| Event::Stop)
                 .recv(self.server.requests(), |request| request.map_or(Event::ActorGone, Event::Request))
                 .recv(&self.actor_gone, |_| Event::ActorGone)
-                .wait();
+                .recv(&self.settled, |settled| settled.map_or(Event::ActorGone, Event::Settled));
+            // A watcher that is not there has nothing to tell.
+            let selector = match &self.watching {
+                Some(_) => selector.recv(&self.news, |news| news.map_or(Event::ActorGone, Event::News)),
+                None => selector,
+            };
+            let is_animated = !self.simulation.scene.animation.is_empty();
+            let event = match self.clock.next().filter(|_| is_animated) {
+                Some(due) => selector.wait_deadline(due).unwrap_or(Event::Tick),
+                None => selector.wait(),
+            };
             match event {
                 Event::Stop => return Some(Ending::Stopped),
                 // An actor ended before its time; `end` finds out which, and why.
                 Event::ActorGone => return None,
+                Event::Settled(version) if version == self.versions => self.clock.settled(),
+                // Of a version that is no longer shown.
+                Event::Settled(_) => {}
+                Event::Tick => {
+                    self.clock.tick(Instant::now());
+                    self.animate();
+                }
+                Event::News(news) => self.hear(news),
                 Event::Request(incoming) => {
                     let Some(Incoming { request, replier, .. }) = self.edit(incoming) else { continue };
                     let ends = matches!(request, Request::Shutdown);
@@ -212,28 +257,129 @@ impl Director {
         }
     }
 
-    fn answer(&self, request: Request) -> Reply {
+    fn answer(&mut self, request: Request) -> Reply {
         match request {
-            Request::Pause => self.change(Change::Pause),
-            Request::Resume => self.change(Change::Resume),
-            Request::Step => self.change(Change::Step),
+            Request::Pause => {
+                self.clock.pause(true);
+                self.change(Change::Pause)
+            }
+            Request::Resume => {
+                self.clock.pause(false);
+                self.change(Change::Resume)
+            }
+            Request::Step => {
+                if !self.simulation.scene.animation.is_empty() {
+                    self.clock.step();
+                    self.animate();
+                }
+                self.change(Change::Step)
+            }
             Request::Shutdown => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
             Request::Query => match self.ask(ToLedger::Query).map(serde_json::to_value) {
                 Some(Ok(state)) => Reply::State { state },
                 Some(Err(error)) => Reply::error("internal", error.to_string()),
                 None => Self::busy(),
             },
-            Request::Reload | Request::SetStreaming { .. } => Reply::error(
-                "unsupported",
-                "this simulator cannot load another config yet; restart it with the edited one",
-            ),
-            Request::SetMaterial { .. } => Reply::error(
-                "unsupported",
-                "this simulator cannot change materials yet; edit the config instead",
-            ),
-            Request::Hello { .. } | Request::SetLight { .. } | Request::MoveObject { .. } => {
+            Request::Reload => self.reload(),
+            Request::SetStreaming { values } => {
+                match settings::with_settings(&self.simulation.scene, &values) {
+                    Ok(scene) => {
+                        self.clock.set(scene.streaming.fixed_step_ms, publish_period(&scene));
+                        self.show(scene, monotonic_ns())
+                    }
+                    Err(SettingsError::Value(error)) => Reply::error(edits::code(&error), error.to_string()),
+                    Err(error) => Reply::error("unknown-key", error.to_string()),
+                }
+            }
+            Request::Hello { .. }
+            | Request::SetLight { .. }
+            | Request::MoveObject { .. }
+            | Request::SetMaterial { .. } => {
                 Reply::error("internal", "the request should have been answered before")
             }
+        }
+    }
+
+    /// Loads the config again, whether it has changed or not.
+    fn reload(&mut self) -> Reply {
+        let Some(config) = &self.config else {
+            return Reply::error("unsupported", "this simulation was not started from a config file");
+        };
+        match config.load() {
+            Ok(scene) => self.show_config(scene),
+            Err(error) => {
+                let reply = Reply::error(edits::code(&error), error.to_string());
+                self.refuse(&error.to_string());
+                reply
+            }
+        }
+    }
+
+    /// Follows what the watcher has seen.
+    fn hear(&mut self, news: News) {
+        match news {
+            News::Scene(scene) => {
+                tracing::info!("the config has changed: it is simulated from now on");
+                self.show_config(*scene);
+            }
+            News::Broken(reason) => self.refuse(&reason),
+            News::Restored => {
+                tracing::info!("the config is again what is simulated");
+                self.tell_all("");
+            }
+        }
+    }
+
+    /// Goes on with the scene of another config, at the time that it is.
+    fn show_config(&mut self, scene: Scene) -> Reply {
+        let received_ns = monotonic_ns();
+        for notice in &scene.notices {
+            tracing::warn!("{}: {notice}", scene.name);
+        }
+        self.clock.set(scene.streaming.fixed_step_ms, publish_period(&scene));
+        let scene = self.at_present(&scene).unwrap_or(scene);
+        let mut still = self.still.next(&scene);
+        still.config_generation += 1;
+        still.notice = Arc::from("");
+        self.show_as(scene, still, received_ns)
+    }
+
+    /// Keeps what is simulated, and says everywhere why.
+    fn refuse(&mut self, reason: &str) {
+        tracing::warn!("the changed config is not shown, the last valid one stays: {reason}");
+        self.tell_all(reason);
+    }
+
+    fn tell_all(&mut self, notice: &str) {
+        if *self.still.notice == *notice {
+            return;
+        }
+        let mut still = self.still.next(&self.simulation.scene);
+        still.notice = Arc::from(notice);
+        let scene = Scene::clone(&self.simulation.scene);
+        self.show_as(scene, still, monotonic_ns());
+    }
+
+    /// The scene at the time that it is; `None` where nothing in it is animated.
+    fn at_present(&self, scene: &Scene) -> Option<Scene> {
+        if scene.animation.is_empty() {
+            return None;
+        }
+        let mut edit = scene.edit();
+        match scene.animation.apply(self.clock.time_s(), &mut edit) {
+            Ok(()) => Some(edit.finish()),
+            Err(error) => {
+                tracing::warn!("the animation stands still: {error}");
+                None
+            }
+        }
+    }
+
+    /// Puts what is animated where it is now.
+    fn animate(&mut self) {
+        let received_ns = monotonic_ns();
+        if let Some(scene) = self.at_present(&self.simulation.scene) {
+            self.show(scene, received_ns);
         }
     }
 
@@ -252,10 +398,26 @@ impl Director {
 
     /// Makes `scene` the version that is simulated and shown.
     fn show(&mut self, scene: Scene, received_ns: u64) -> Reply {
-        self.still = Arc::new(self.still.next(&scene));
-        self.simulation = self.simulation.with_scene(Arc::new(scene));
-        let version =
-            Version { simulation: self.simulation.clone(), still: Arc::clone(&self.still), received_ns };
+        let still = self.still.next(&scene);
+        self.show_as(scene, still, received_ns)
+    }
+
+    fn show_as(&mut self, scene: Scene, still: Still, received_ns: u64) -> Reply {
+        let scene = Arc::new(scene);
+        let next = if self.simulation.has_lights_of(&scene) {
+            self.simulation.with_scene(scene)
+        } else {
+            self.simulation.reloaded(scene)
+        };
+        (self.simulation, self.still) = (next, Arc::new(still));
+        self.versions += 1;
+        let version = Version {
+            simulation: self.simulation.clone(),
+            still: Arc::clone(&self.still),
+            received_ns,
+            time_s: self.clock.time_s(),
+            only_whole: self.clock.is_fixed() && !self.simulation.scene.animation.is_empty(),
+        };
         match self.ask(|sender| ToLedger::Edit(Box::new(version), sender)) {
             Some(frame) => Reply::Ok { frame },
             None => Self::busy(),
@@ -284,6 +446,11 @@ impl Director {
     fn end(self, ending: Option<Ending>) -> Result<Summary, SimulatorError> {
         // Pairs with the publisher's load.
         self.orderly.store(ending.is_some(), Ordering::Release);
+        if let Some((stop, watcher)) = self.watching {
+            drop((stop, self.news));
+            // A watcher that panicked has ended, too.
+            let _ = watcher.join();
+        }
         // The ledger may be gone already.
         let _ = self.to_ledger.send(ToLedger::Stop);
         let ledger = self.ledger.join();
@@ -305,4 +472,9 @@ impl Director {
             counters,
         })
     }
+}
+
+/// Time between two frames.
+fn publish_period(scene: &Scene) -> Duration {
+    Duration::from_secs_f32(scene.streaming.publish_period_ms.max(0.1) / 1e3)
 }

@@ -28,6 +28,7 @@ impl Edits {
             let result = match &request {
                 Request::SetLight { name, values } => self.edit.set_light(name, values).map(|_| ()),
                 Request::MoveObject { name, values } => self.edit.move_object(name, values).map(|_| ()),
+                Request::SetMaterial { name, values } => self.edit.set_material(name, values).map(|_| ()),
                 _ => return Some(Incoming { request, replier }),
             };
             match result {
@@ -45,7 +46,7 @@ impl Edits {
 }
 
 /// The word for programs.
-fn code(error: &SceneError) -> &'static str {
+pub(super) fn code(error: &SceneError) -> &'static str {
     match error {
         SceneError::UnknownName { .. } => "unknown-name",
         SceneError::UnknownKey { .. } => "unknown-key",

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     change::Change as SceneChange,
     counters::Counters,
-    ledger::{Ledger, Task},
+    ledger::{Ledger, Migration, Task},
     records,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
@@ -40,6 +40,10 @@ pub(super) struct Version {
     pub(super) still: Arc<Still>,
     /// When the edit arrived, monotonic ns.
     pub(super) received_ns: u64,
+    /// Time of the simulated scene, s.
+    pub(super) time_s: f64,
+    /// Publish it only once its light is whole: time goes on in fixed steps.
+    pub(super) only_whole: bool,
 }
 
 /// What the ledger can be told to do.
@@ -72,6 +76,18 @@ pub struct State {
     pub pool_valid: u32,
     /// Share of the pool that stands for the scene before the last edit.
     pub stale_share: f64,
+    /// Samples beyond the pool in the present light.
+    pub refined_paths: u64,
+    /// Relative standard error of the flux, weighted by flux.
+    pub relative_error: f64,
+    /// Milliseconds from the last change that needed rays to its light, whole.
+    pub latency_ms: f64,
+    /// Seconds of simulated time.
+    pub simulation_time_s: f64,
+    /// Configs loaded since the start.
+    pub config_generation: u64,
+    /// Why the edited config is not simulated; empty where it is.
+    pub notice: String,
     /// Tracer threads.
     pub threads: usize,
     /// Paths traced a second, over the time in which there was work.
@@ -100,6 +116,8 @@ pub(super) struct LedgerActor {
     pub(super) emptied: Arc<ArrayQueue<PlacedRecords>>,
     /// Stop handing out work after this many paths.
     pub(super) after_paths: Option<u64>,
+    /// Told whenever a frame of the whole light of a version was published.
+    pub(super) settled: flume::Sender<u64>,
 }
 
 struct Progress {
@@ -107,8 +125,23 @@ struct Progress {
     still: Arc<Still>,
     ledger: Ledger,
     tracer: Arc<Tracer>,
-    /// Counts the versions in which objects moved.
+    /// Counts the versions in which objects moved, and those with other virtual surface lights.
     places: u64,
+    placements: u64,
+    /// Time of the simulated scene.
+    time_s: f64,
+    only_whole: bool,
+    /// Versions after the first.
+    versions: u64,
+    /// The present version was not yet published whole.
+    unsettled: bool,
+    /// When the oldest change came whose light is not traced yet, monotonic ns.
+    waiting_since_ns: Option<u64>,
+    latency_ms: f64,
+    /// Of the frame published last.
+    relative_error: f64,
+    /// How long the last frame took to be made.
+    publishing: Duration,
     spare: Vec<PathBatch>,
     started: Instant,
     paused: bool,
@@ -128,8 +161,6 @@ struct Progress {
 
 impl LedgerActor {
     pub(super) fn run(self) -> Counters {
-        let period =
-            Duration::from_secs_f32(self.simulation.scene.streaming.publish_period_ms.max(0.1) / 1e3);
         let started = Instant::now();
         let mut progress = Progress {
             simulation: self.simulation.clone(),
@@ -137,12 +168,21 @@ impl LedgerActor {
             ledger: self.simulation.ledger(),
             tracer: Arc::new(self.simulation.tracer.clone()),
             places: 0,
+            placements: 0,
+            time_s: 0.0,
+            only_whole: false,
+            versions: 0,
+            unsettled: true,
+            waiting_since_ns: None,
+            latency_ms: 0.0,
+            relative_error: 0.0,
+            publishing: Duration::ZERO,
             spare: Vec::new(),
             started,
             paused: false,
             stepping: false,
             changed: true,
-            next_frame: started + period,
+            next_frame: started + period(&self.simulation),
             frames: 0,
             edit_received_ns: 0,
             traced_ns: 0,
@@ -158,14 +198,17 @@ impl LedgerActor {
             progress.note_activity(now);
             let done = self.is_done(&progress);
             let settled = progress.ledger.in_flight() == 0;
-            if progress.changed && (now >= progress.next_frame || (settled && (done || progress.paused))) {
-                match self.publish(&mut progress, done, period) {
+            let may_be_shown = !progress.only_whole || progress.paused || progress.ledger.is_settled();
+            let is_at_rest = settled && (done || progress.paused);
+            let is_due = now >= progress.next_frame || is_at_rest;
+            if progress.changed && may_be_shown && is_due {
+                match self.publish(&mut progress, done) {
                     Published::Yes => {}
                     Published::Later => progress.next_frame = now + Duration::from_millis(1),
                     Published::Gone => break,
                 }
             }
-            let message = if progress.changed {
+            let message = if progress.changed && may_be_shown {
                 match self.inbox.recv_deadline(progress.next_frame) {
                     Ok(message) => message,
                     Err(flume::RecvTimeoutError::Timeout) => continue,
@@ -221,6 +264,7 @@ impl LedgerActor {
                 let birth_ms = progress.now_ms();
                 progress.traced_ns = monotonic_ns();
                 progress.spare.extend(progress.ledger.apply(task, batch, birth_ms));
+                progress.note_whole_light();
                 progress.changed = true;
             }
             ToLedger::Change(change, reply) => {
@@ -247,26 +291,39 @@ impl LedgerActor {
         true
     }
 
-    fn publish(&self, progress: &mut Progress, converged: bool, period: Duration) -> Published {
+    fn publish(&self, progress: &mut Progress, converged: bool) -> Published {
         let Some(mut vsls) = self.emptied.pop() else { return Published::Later };
         let begun = Instant::now();
         let scene = &progress.simulation.scene;
+        if vsls.placement != progress.placements {
+            vsls.records = records::vsl_records(scene, &progress.simulation.placement);
+            let generation = progress.placements as u32;
+            vsls.records.iter_mut().for_each(|record| record.generation = generation);
+            (vsls.placement, vsls.version) = (progress.placements, progress.places);
+        }
         if vsls.version != progress.places {
             vsls.version = progress.places;
             records::write_places(&mut vsls.records, scene, &progress.simulation.placement);
         }
         records::write_flux(&mut vsls.records, progress.ledger.readings(scene), progress.now_ms());
         let still = Arc::clone(&progress.still);
+        progress.relative_error = records::relative_error(&vsls.records);
         let statistics = self.statistics(progress, converged || progress.ledger.is_converged());
         let snapshot = Snapshot { vsls, still, statistics, paused: progress.paused };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }
         let now = Instant::now();
-        progress.next_frame = now + period.max((now - begun) * PUBLISHING_SHARE);
+        progress.publishing = now - begun;
+        progress.next_frame = now + period(&progress.simulation).max(progress.publishing * PUBLISHING_SHARE);
         progress.frames += 1;
         progress.changed = false;
         progress.stepping = false;
+        if progress.unsettled && progress.ledger.is_settled() {
+            progress.unsettled = false;
+            // Whoever does not listen does not wait for it.
+            let _ = self.settled.send(progress.versions);
+        }
         Published::Yes
     }
 
@@ -281,11 +338,20 @@ impl LedgerActor {
             paths_per_s: counters.paths as f64 / seconds,
             rays_per_s: counters.rays as f64 / seconds,
             deposits_per_s: counters.deposits as f64 / seconds,
-            stale_share: f64::from(progress.ledger.stale_paths()) / f64::from(slots.max(1)),
-            pool_paths: u64::from(slots),
+            stale_share: f64::from(progress.ledger.stale_paths())
+                / f64::from(progress.ledger.active_slots().max(1)),
+            pool_paths: u64::from(progress.ledger.active_slots()),
             pool_valid: progress.ledger.pool().valid().iter().map(|&v| u64::from(v)).sum(),
             converged: u64::from(converged),
-            simulation_time_s: uptime,
+            simulation_time_s: if scene.animation.is_empty() { uptime } else { progress.time_s },
+            refined_paths: progress.ledger.refined_paths(),
+            relative_error: progress.relative_error,
+            target_error: scene.streaming.target_error,
+            rays_saved: progress.ledger.savings().rays_saved,
+            retraced_paths: progress.ledger.savings().retraced_paths,
+            pool_capacity: u64::from(slots),
+            latency_ms: progress.latency_ms,
+            latency_target_ms: scene.streaming.latency_ms,
             threads: self.threads as u64,
             edit_received_ns: progress.edit_received_ns,
             traced_ns: progress.traced_ns,
@@ -299,18 +365,24 @@ impl LedgerActor {
         let converged = self.is_done(progress) || progress.ledger.is_converged();
         let statistics = self.statistics(progress, converged);
         State {
-            scene: self.simulation.scene.name.clone(),
-            scene_hash: format!("{:016x}", self.simulation.scene.hash),
+            scene: progress.simulation.scene.name.clone(),
+            scene_hash: format!("{:016x}", progress.simulation.scene.hash),
             paused: progress.paused,
             converged: statistics.converged == 1,
-            vsls: self.simulation.placement.vsls.len(),
+            vsls: progress.simulation.placement.vsls.len(),
             pool_paths: statistics.pool_paths as u32,
             pool_valid: statistics.pool_valid as u32,
             stale_share: statistics.stale_share,
+            refined_paths: statistics.refined_paths,
+            relative_error: statistics.relative_error,
+            latency_ms: statistics.latency_ms,
+            simulation_time_s: statistics.simulation_time_s,
+            config_generation: progress.still.config_generation,
+            notice: progress.still.notice.to_string(),
             threads: self.threads,
             paths_per_s: statistics.paths_per_s,
             rays_per_s: statistics.rays_per_s,
-            uptime_s: statistics.simulation_time_s,
+            uptime_s: progress.started.elapsed().as_secs_f64(),
             counters: progress.ledger.counters(),
         }
     }
@@ -319,17 +391,55 @@ impl LedgerActor {
 impl Progress {
     /// Goes on in a new version of the scene. Batches under way stay those of the old one.
     fn edit(&mut self, version: Version) {
-        let Version { simulation, still, received_ns } = version;
-        self.places += u64::from(!Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry));
-        let change = SceneChange::between(&self.simulation, &simulation);
-        self.ledger.revise(&simulation, change, None);
+        let Version { simulation, still, received_ns, time_s, only_whole } = version;
+        if Arc::ptr_eq(&simulation.owners, &self.simulation.owners) {
+            let is_still = Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry);
+            self.places += u64::from(!is_still);
+            let change = SceneChange::between(&self.simulation, &simulation);
+            let budget = self.budget(&simulation);
+            self.ledger.revise(&simulation, change, budget);
+        } else {
+            self.places += 1;
+            self.placements += 1;
+            let migration = Migration::between(&self.simulation, &simulation);
+            // Its place is taken at once.
+            let old = std::mem::replace(&mut self.ledger, simulation.ledger());
+            self.ledger = old.migrate(&migration, &simulation);
+        }
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;
         self.still = still;
+        (self.time_s, self.only_whole, self.unsettled) = (time_s, only_whole, true);
+        self.versions += 1;
         self.edit_received_ns = received_ns;
         // An edit that needs no ray is traced with its arrival.
         self.traced_ns = monotonic_ns();
+        self.waiting_since_ns.get_or_insert(received_ns);
+        self.note_whole_light();
         self.changed = true;
+    }
+
+    /// The number of paths that can be traced in the time that a change may take; `None` where it may take any.
+    fn budget(&self, simulation: &Simulation) -> Option<u32> {
+        let latency_ms = simulation.scene.streaming.latency_ms;
+        let seconds = self.active_time(Instant::now()).as_secs_f64();
+        let paths = self.ledger.counters().paths;
+        // A rate of less than that says little.
+        if latency_ms <= 0.0 || paths < 4096 || seconds <= 0.0 {
+            return None;
+        }
+        // The frame that shows it has to be made, too.
+        let time = (latency_ms / 1e3 - self.publishing.as_secs_f64()).max(0.1 * latency_ms / 1e3);
+        Some((paths as f64 / seconds * time).min(f64::from(u32::MAX)) as u32)
+    }
+
+    /// Notes how long a change has taken, once its light is traced.
+    fn note_whole_light(&mut self) {
+        if self.ledger.is_settled()
+            && let Some(since) = self.waiting_since_ns.take()
+        {
+            self.latency_ms = self.traced_ns.saturating_sub(since) as f64 * 1e-6;
+        }
     }
 
     fn now_ms(&self) -> u32 {
@@ -357,4 +467,12 @@ enum Published {
     /// The publisher still has the memory.
     Later,
     Gone,
+}
+
+/// Time between two frames: half of the time that a change may take, where the scene says so.
+fn period(simulation: &Simulation) -> Duration {
+    let streaming = &simulation.scene.streaming;
+    let wanted = f64::from(streaming.publish_period_ms.max(0.1));
+    let half = if streaming.latency_ms > 0.0 { 0.5 * streaming.latency_ms } else { f64::INFINITY };
+    Duration::from_secs_f64(wanted.min(half) / 1e3)
 }

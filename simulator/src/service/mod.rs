@@ -1,21 +1,27 @@
 //! Turns a scene into a running service: actors joined by channels, each owning what it writes.
 //!
 //! ```text
-//! control socket ─┐
-//! signals ────────┴─ director ─→ ledger ⇄ tracers × N        (tasks out, finished batches in)
+//! config watcher ─┐
+//! control socket ─┤
+//! signals, clock ─┴─ director ─→ ledger ⇄ tracers × N        (tasks out, finished batches in)
 //!                                  └────→ publisher ─→ shared memory
 //! ```
 //!
-//! The director decides, and turns edits into new versions of the scene, the ledger alone writes pool and flux, tracers have no state, the publisher alone writes shared
-//! memory. All channels are bounded: who is slow slows down who feeds it. When nothing is left to trace every thread
+//! The director decides, and turns edits, saved configs and time into new versions of the scene, the ledger alone writes
+//! pool and flux, tracers have no state, the publisher alone writes shared memory. All channels are bounded: who is slow slows down who feeds it. When nothing is left to trace every thread
 //! sleeps.
 
+mod clock;
+mod config_source;
 mod director;
 mod edits;
 mod ledger_actor;
 mod publisher_actor;
+mod settings;
 mod tracer_actor;
+mod watcher;
 
+pub use config_source::ConfigSource;
 pub use director::{Ending, Options, Summary, run};
 pub use ledger_actor::State;
 

@@ -3,7 +3,8 @@
 use crate::records;
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
-    FrameSource, LightRecord, ObjectRecord, ProtocolError, Publisher, StatisticsRecord, VslRecord,
+    FrameSource, LightRecord, NOTICE_CAPACITY, ObjectRecord, ProtocolError, Publisher, SegmentSpec,
+    StatisticsRecord, VslRecord,
 };
 use photonstream_scene::Scene;
 use std::{
@@ -22,11 +23,14 @@ pub(super) struct Snapshot {
     pub(super) paused: bool,
 }
 
-/// Records of all virtual surface lights, and the version of the scene that their places are from.
+/// Records of all virtual surface lights, and the versions of the scene that they are from.
 #[derive(Clone, Debug)]
 pub(super) struct PlacedRecords {
     pub(super) records: Vec<VslRecord>,
+    /// Of their places.
     pub(super) version: u64,
+    /// Of the lights themselves.
+    pub(super) placement: u64,
 }
 
 /// What stays the same from frame to frame of one version of the scene.
@@ -34,6 +38,11 @@ pub(super) struct Still {
     pub(super) objects: Vec<ObjectRecord>,
     pub(super) lights: Vec<LightRecord>,
     pub(super) scene_text: Arc<str>,
+    pub(super) scene_hash: u64,
+    /// Counts the configs that were loaded.
+    pub(super) config_generation: u64,
+    /// What everybody should know: why the edited config is not shown. Empty where there is nothing.
+    pub(super) notice: Arc<str>,
 }
 
 impl Still {
@@ -43,12 +52,34 @@ impl Still {
             objects: records::object_records(scene),
             lights: records::light_records(scene),
             scene_text: Arc::clone(&scene.resolved_text),
+            scene_hash: scene.hash,
+            config_generation: 1,
+            notice: Arc::from(""),
+        }
+    }
+
+    /// What a segment for a frame of so many virtual surface lights has to hold; no less than `least`.
+    pub(super) fn spec(&self, vsls: usize, least: Option<&SegmentSpec>) -> SegmentSpec {
+        let size = |count: usize, least: Option<u32>| (count.max(1) as u32).max(least.unwrap_or(0));
+        SegmentSpec {
+            vsl_capacity: size(vsls, least.map(|l| l.vsl_capacity)),
+            object_capacity: size(self.objects.len(), least.map(|l| l.object_capacity)),
+            light_capacity: size(self.lights.len(), least.map(|l| l.light_capacity)),
+            scene_text_capacity: size(self.scene_text.len(), least.map(|l| l.scene_text_capacity)),
+            notice_capacity: NOTICE_CAPACITY,
+            scene_hash: self.scene_hash,
+            slots: 3,
         }
     }
 
     /// The records of the next version; those that change count their generation up.
     pub(super) fn next(&self, scene: &Scene) -> Self {
         let mut next = Self::new(scene);
+        next.config_generation = self.config_generation;
+        next.notice = Arc::clone(&self.notice);
+        if next.scene_hash != self.scene_hash {
+            return next;
+        }
         for (new, old) in next.objects.iter_mut().zip(&self.objects) {
             new.generation = old.generation;
             new.generation += u32::from(new != old);
@@ -120,7 +151,19 @@ impl PublisherActor {
         }
     }
 
+    /// Takes another segment where the scene is another one, or does not fit into the present one.
+    fn make_room(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
+        let spec = self.publisher.spec();
+        let least = snapshot.still.spec(snapshot.vsls.records.len(), Some(spec));
+        if least != *spec {
+            // Only a larger or another scene: what is too large is kept for the next one.
+            self.publisher.replace_segment(&least)?;
+        }
+        Ok(())
+    }
+
     fn publish(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
+        self.make_room(snapshot)?;
         let frame = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls.records,
             changed: None,
@@ -128,8 +171,8 @@ impl PublisherActor {
             lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
             scene_text: &snapshot.still.scene_text,
-            notice: "",
-            config_generation: 1,
+            notice: &snapshot.still.notice,
+            config_generation: snapshot.still.config_generation,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;
         self.latest_frame.store(frame, Ordering::Release);

@@ -28,7 +28,7 @@ pub(crate) fn start(
 ) -> Service {
     let channel: ChannelName = format!("t{}-{name}", std::process::id()).parse().unwrap();
     let (stop, stopped) = flume::bounded(1);
-    let options = Options { channel: channel.clone(), threads: Some(threads), after_paths };
+    let options = Options { channel: channel.clone(), threads: Some(threads), after_paths, config: None };
     let simulation = simulation.clone();
     let thread = std::thread::spawn(move || service::run(simulation, &options, &stopped).unwrap());
     Service { channel, stop, thread }
@@ -170,7 +170,7 @@ fn a_panic_ends_the_service() {
     let broken = Simulation { tracer, ..large };
     let channel: ChannelName = format!("t{}-panic", std::process::id()).parse().unwrap();
     let (_stop, stopped) = flume::bounded(1);
-    let options = Options { channel: channel.clone(), threads: Some(2), after_paths: None };
+    let options = Options { channel: channel.clone(), threads: Some(2), after_paths: None, config: None };
     let error = service::run(broken, &options, &stopped).unwrap_err();
     assert!(error.to_string().contains("tracer"), "{error}");
     // Left as a crash leaves it: renderers wait for a successor.

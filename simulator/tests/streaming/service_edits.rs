@@ -239,7 +239,7 @@ fn bad_edits_are_refused_and_change_nothing() {
         ),
         (move_object("bell", json!({ "position_m": [0, 0, 0] })), "unknown-name", "did you mean \"ball\"?"),
         (move_object("ball", json!({ "position_m": "up" })), "invalid-value", "expected three numbers"),
-        (Request::Reload, "unsupported", "restart it"),
+        (Request::Reload, "unsupported", "not started from a config file"),
     ] {
         match client.request(&request, PATIENCE).unwrap() {
             Reply::Error { code, message } => {

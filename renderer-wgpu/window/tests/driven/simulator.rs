@@ -100,7 +100,7 @@ fn run(scene: &Arc<Scene>, channel: &ChannelName) -> (std::sync::mpsc::Sender<()
             let _ = stopped.recv();
             let _ = sender.send(());
         });
-        let options = Options { channel, threads: Some(1), after_paths: None };
+        let options = Options { channel, threads: Some(1), after_paths: None, config: None };
         service::run(Simulation::new(scene), &options, &receiver).unwrap();
         bridge.join().unwrap();
     });

@@ -1,0 +1,237 @@
+//! Turns changes of a config file and its assets into scenes, or into the reason why there is none.
+//!
+//! The folder is watched, not the file, which editors replace. After a change the file is read once it has been quiet for
+//! a moment, twice, until both readings are equal; an empty file is one that is being saved. Where the system tells nothing
+//! (network folders, a folder that was removed and made again) a look at sizes and times every half second finds it.
+
+use super::{config_source, config_source::ConfigSource, spawn};
+use crate::error::SimulatorError;
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use photonstream_scene::Scene;
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::{Duration, Instant, SystemTime},
+};
+
+/// What has become of the config.
+pub(super) enum News {
+    /// It is another scene.
+    Scene(Box<Scene>),
+    /// It is no scene: why, with file, line and column.
+    Broken(String),
+    /// It is again what is being simulated.
+    Restored,
+}
+
+/// So long nothing must happen before the file is read.
+const QUIET: Duration = Duration::from_millis(100);
+/// A file that is saved without pause is read after this time all the same.
+const PATIENCE: Duration = Duration::from_millis(250);
+/// Time between two readings that have to be equal.
+const BETWEEN: Duration = Duration::from_millis(10);
+/// Time between two looks for changes that nobody told of.
+const LOOK: Duration = Duration::from_millis(500);
+/// A file that is not there for so many looks is gone, and not being replaced.
+const GONE_AFTER: u32 = 2;
+
+/// Watches until `stop` is closed. `loaded` is the scene as it was loaded at the start.
+pub(super) fn start(
+    source: ConfigSource,
+    loaded: &Scene,
+    news: flume::Sender<News>,
+    stop: flume::Receiver<()>,
+) -> Result<std::thread::JoinHandle<()>, SimulatorError> {
+    let (tell, told) = flume::bounded(1);
+    let watch = Watch {
+        files: config_source::assets(loaded),
+        watcher: watcher(tell),
+        watched: false,
+        told,
+        good: None,
+        tried: None,
+        seen: Fingerprint::default(),
+        good_hash: loaded.hash,
+        is_broken: false,
+        missing: 0,
+        source,
+    };
+    spawn("config watcher", move || watch.run(&news, &stop))
+}
+
+fn watcher(tell: flume::Sender<()>) -> Option<RecommendedWatcher> {
+    let told = move |event: notify::Result<notify::Event>| {
+        let only_read = event.is_ok_and(|event| event.kind.is_access());
+        if !only_read {
+            // One message is enough.
+            let _ = tell.try_send(());
+        }
+    };
+    notify::recommended_watcher(told)
+        .inspect_err(|error| tracing::info!("changes of the config are looked for by time: {error}"))
+        .ok()
+}
+
+struct Watch {
+    source: ConfigSource,
+    files: Vec<PathBuf>,
+    watcher: Option<RecommendedWatcher>,
+    watched: bool,
+    told: flume::Receiver<()>,
+    /// The text of the scene that is simulated; `None` until it was read here.
+    good: Option<String>,
+    /// The text that was tried last.
+    tried: Option<String>,
+    seen: Fingerprint,
+    good_hash: u64,
+    is_broken: bool,
+    missing: u32,
+}
+
+/// Sizes and times of the config and its assets.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Fingerprint(Vec<Option<(u64, Option<SystemTime>)>>);
+
+enum Heard {
+    Change,
+    Nothing,
+    Stop,
+}
+
+impl Watch {
+    fn run(mut self, news: &flume::Sender<News>, stop: &flume::Receiver<()>) {
+        self.seen = self.fingerprint();
+        // What was loaded, if nobody has saved since.
+        self.good = read(&self.source.path).ok();
+        self.tried.clone_from(&self.good);
+        self.listen();
+        loop {
+            let was_told = match self.hear(LOOK, stop) {
+                Heard::Stop => return,
+                Heard::Change if !self.wait_for_quiet(stop) => return,
+                Heard::Change => true,
+                Heard::Nothing => false,
+            };
+            let now = self.fingerprint();
+            let is_missing = now.0.first().is_none_or(Option::is_none);
+            self.missing = if is_missing { self.missing + 1 } else { 0 };
+            if is_missing {
+                self.watched = false;
+            } else if !self.watched {
+                self.listen();
+            }
+            let is_gone = self.missing == GONE_AFTER;
+            // Two saves may have one time.
+            if now == self.seen && !is_gone && !was_told {
+                continue;
+            }
+            let assets_changed = now.0.get(1..) != self.seen.0.get(1..);
+            if let Some(message) = self.look(assets_changed, is_gone)
+                && news.send(message).is_err()
+            {
+                return;
+            }
+            self.seen = if is_missing { Fingerprint::default() } else { now };
+        }
+    }
+
+    /// Watches the folders of all files; again, where one was removed.
+    fn listen(&mut self) {
+        let Some(watcher) = &mut self.watcher else { return };
+        let folders = self.files.iter().filter_map(|file| file.parent());
+        let mut folders: Vec<&Path> = folders.chain([self.source.folder()]).collect();
+        folders.sort();
+        folders.dedup();
+        self.watched = true;
+        for folder in folders {
+            // What cannot be watched is looked at by time.
+            let _ = watcher.unwatch(folder);
+            self.watched &= watcher.watch(folder, RecursiveMode::NonRecursive).is_ok();
+        }
+    }
+
+    fn hear(&self, timeout: Duration, stop: &flume::Receiver<()>) -> Heard {
+        flume::Selector::new()
+            .recv(&self.told, |told| if told.is_ok() { Heard::Change } else { Heard::Nothing })
+            .recv(stop, |_| Heard::Stop)
+            .wait_timeout(timeout)
+            .unwrap_or(Heard::Nothing)
+    }
+
+    /// Until nothing has happened for a moment; false where it is time to end.
+    fn wait_for_quiet(&self, stop: &flume::Receiver<()>) -> bool {
+        let deadline = Instant::now() + PATIENCE;
+        while Instant::now() < deadline {
+            match self.hear(QUIET, stop) {
+                Heard::Stop => return false,
+                Heard::Nothing => return true,
+                Heard::Change => {}
+            }
+        }
+        true
+    }
+
+    fn fingerprint(&self) -> Fingerprint {
+        let look = |path: &PathBuf| path.metadata().ok().map(|m| (m.len(), m.modified().ok()));
+        Fingerprint([&self.source.path].into_iter().chain(&self.files).map(look).collect())
+    }
+
+    /// What there is to tell after a change.
+    fn look(&mut self, assets_changed: bool, is_gone: bool) -> Option<News> {
+        let text = match read_twice(&self.source.path) {
+            Ok(text) if text.trim().is_empty() => return None,
+            Ok(text) => text,
+            Err(_) if !is_gone => return None,
+            Err(error) => {
+                self.tried = None;
+                self.is_broken = true;
+                let path = self.source.path.display();
+                return Some(News::Broken(format!("{path}: cannot be read ({error}); restore it")));
+            }
+        };
+        if self.tried.as_ref() == Some(&text) && !assets_changed {
+            return None;
+        }
+        self.tried = Some(text.clone());
+        if self.good.as_ref() == Some(&text) && !assets_changed {
+            return std::mem::take(&mut self.is_broken).then_some(News::Restored);
+        }
+        match self.source.load_text(&text) {
+            Ok(scene) => {
+                let is_same = scene.hash == self.good_hash;
+                (self.good, self.good_hash) = (Some(text), scene.hash);
+                let was_broken = std::mem::take(&mut self.is_broken);
+                if is_same {
+                    return was_broken.then_some(News::Restored);
+                }
+                self.files = config_source::assets(&scene);
+                self.watched = false;
+                Some(News::Scene(Box::new(scene)))
+            }
+            Err(error) => {
+                self.is_broken = true;
+                Some(News::Broken(error.to_string()))
+            }
+        }
+    }
+}
+
+fn read(path: &Path) -> io::Result<String> {
+    let bytes = std::fs::read(path)?;
+    String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+}
+
+/// Reads until two readings are equal, a few times.
+fn read_twice(path: &Path) -> io::Result<String> {
+    let mut last = read(path);
+    for _ in 0..20 {
+        std::thread::sleep(BETWEEN);
+        let now = read(path);
+        match (last, now) {
+            (Ok(a), Ok(b)) if a == b => return Ok(b),
+            (Err(_), Err(error)) => return Err(error),
+            (_, now) => last = now,
+        }
+    }
+    last
+}
