@@ -183,6 +183,26 @@ fn numbers_outside_their_domain_are_refused() {
             "publish_period_ms = 0",
             ":22:21: streaming.publish_period_ms: found 0, expected a time",
         ),
+        (
+            "vsls = 100",
+            "fixed_step_ms = 0",
+            ":22:17: streaming.fixed_step_ms: found 0, expected a time above 0",
+        ),
+        (
+            "vsls = 100",
+            "fixed_step_ms = nan",
+            ":22:17: streaming.fixed_step_ms: found NaN, expected a time above",
+        ),
+        (
+            "vsls = 100",
+            "target_error = -0.1",
+            ":22:16: streaming.target_error: found -0.1, expected a relative",
+        ),
+        (
+            "vsls = 100",
+            "latency_ms = 60001",
+            ":22:14: streaming.latency_ms: found 60001, expected a time from 0",
+        ),
         ("vsls = 100", "threads = 0", ":22:11: streaming.threads: found 0, expected a whole number"),
         (
             "vsls = 100",

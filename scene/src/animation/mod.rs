@@ -71,23 +71,10 @@ impl Animation {
     ///
     /// # Errors
     /// If the time is not finite, a moved object comes to lie beyond what f32 can hold, a spot comes to stand at its own
-    /// target, or the scene has no such light or object. Things before it in the alphabet are already moved then.
+    /// target, or the scene has no such light or object; nothing is changed then.
     pub fn apply(&self, time_s: f64, edit: &mut SceneEdit) -> Result<(), SceneError> {
         check_time(time_s)?;
-        for target in &self.targets {
-            let (mut light, mut object) = (Values::new(), Values::new());
-            for (property, track) in &target.tracks {
-                let values = if target.kind.moves_surface(*property) { &mut object } else { &mut light };
-                values.insert(property.name().to_owned(), track.at(time_s).to_array().to_vec().into());
-            }
-            if !light.is_empty() {
-                edit.set_light(&target.name, &light)?;
-            }
-            if !object.is_empty() {
-                edit.move_object(&target.name, &object)?;
-            }
-        }
-        Ok(())
+        edit.all_or_nothing(|edit| self.targets.iter().try_for_each(|target| target.apply(time_s, edit)))
     }
 
     /// The numbers of objects and of lights that move; lights move with the objects that show them.
@@ -108,6 +95,23 @@ impl Animation {
         };
         let count = |moving: &mut dyn Iterator<Item = bool>| moving.filter(|moves| *moves).count() as u32;
         (count(&mut moving.iter().copied()), count(&mut lights.iter().map(light_moves)))
+    }
+}
+
+impl Target {
+    fn apply(&self, time_s: f64, edit: &mut SceneEdit) -> Result<(), SceneError> {
+        let (mut light, mut object) = (Values::new(), Values::new());
+        for (property, track) in &self.tracks {
+            let values = if self.kind.moves_surface(*property) { &mut object } else { &mut light };
+            values.insert(property.name().to_owned(), track.at(time_s).to_array().to_vec().into());
+        }
+        if !light.is_empty() {
+            edit.set_light(&self.name, &light)?;
+        }
+        if !object.is_empty() {
+            edit.move_object(&self.name, &object)?;
+        }
+        Ok(())
     }
 }
 

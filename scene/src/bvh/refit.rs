@@ -1,4 +1,8 @@
 //! Turns the structure of a part whose vertices moved into one of the same tree around them, while that tree is good.
+//!
+//! Measured on the knot of 100 000 triangles, turned by 10 to 180 degrees: 54 to 57 times as fast as building (3.6 to
+//! 5.2 ms instead of 206 to 291 ms), with rays 4 to 7 % slower than in a tree built anew. `cargo bench -p
+//! photonstream-scene --bench moves`, two shared cores with AVX2.
 
 use glam::Vec3;
 

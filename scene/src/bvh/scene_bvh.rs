@@ -66,10 +66,25 @@ impl SceneBvh {
     ///
     /// A number that is not a part changes nothing.
     pub fn rebuild_part(&mut self, part: usize, vertices: &[Vec3], triangles: &[[u32; 3]]) {
-        if let Some(part) = self.parts.get_mut(part) {
+        self.rebuild_parts([part], vertices, triangles);
+    }
+
+    /// As [`Self::rebuild_part`] for each of several parts, with one new top level for all of them.
+    pub fn rebuild_parts(
+        &mut self,
+        parts: impl IntoIterator<Item = usize>,
+        vertices: &[Vec3],
+        triangles: &[[u32; 3]],
+    ) {
+        let mut any = false;
+        for part in parts {
+            let Some(part) = self.parts.get_mut(part) else { continue };
             let refitted = part.bvh.refitted(vertices, triangles);
             let bvh = refitted.unwrap_or_else(|| Bvh::build(vertices, triangles, part.range.clone()));
             part.bvh = Arc::new(bvh);
+            any = true;
+        }
+        if any {
             self.build_top();
         }
     }

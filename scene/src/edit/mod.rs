@@ -151,7 +151,6 @@ impl SceneEdit {
         }
         let geometry = Arc::make_mut(&mut scene.geometry);
         resize(geometry, &scene.rest_meshes, &scene.poses, &scene.objects, &moves);
-        let triangles = Arc::clone(&geometry.triangles);
         for (id, pose) in &moves {
             let mesh = &scene.rest_meshes[id.0 as usize];
             let object = &mut scene.objects[id.0 as usize];
@@ -166,8 +165,9 @@ impl SceneEdit {
                     .or_else(|| turned_normal(geometry.rest_triangle(triangle), pose))
                     .unwrap_or(geometry.normals[triangle as usize]);
             }
-            scene.bvh.rebuild_part(id.0 as usize, &geometry.vertices, &triangles);
         }
+        let parts = moves.iter().map(|(id, _)| id.0 as usize);
+        scene.bvh.rebuild_parts(parts, &geometry.vertices, &geometry.triangles);
         scene.bounds = bake::sphere_around(&geometry.vertices);
         for light in &mut scene.lights {
             let (Some(object), Some((face, strength))) = (light.object, light.face) else { continue };
@@ -181,6 +181,19 @@ impl SceneEdit {
             }
         }
         scene
+    }
+
+    /// Edits lights and objects all together, or not at all where one of them fails.
+    pub(crate) fn all_or_nothing(
+        &mut self,
+        edits: impl FnOnce(&mut Self) -> Result<(), SceneError>,
+    ) -> Result<(), SceneError> {
+        let before = (self.scene.lights.clone(), self.poses.clone());
+        let result = edits(self);
+        if result.is_err() {
+            (self.scene.lights, self.poses) = before;
+        }
+        result
     }
 
     /// The pose of an object, edits included.
