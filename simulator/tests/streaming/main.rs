@@ -1,9 +1,11 @@
 //! Tests of the simulator through its public interface.
 
+mod animated;
 mod closed_forms;
 mod edits;
 mod exactness;
 mod placed;
+mod reload;
 mod selective;
 mod service;
 mod service_edits;

@@ -26,9 +26,14 @@ pub(crate) fn start(
     threads: usize,
     after_paths: Option<u64>,
 ) -> Service {
+    start_with(name, simulation, Options { threads: Some(threads), after_paths, ..Options::default() })
+}
+
+/// On a channel of its own, whatever `options` say.
+pub(crate) fn start_with(name: &str, simulation: &Simulation, options: Options) -> Service {
     let channel: ChannelName = format!("t{}-{name}", std::process::id()).parse().unwrap();
     let (stop, stopped) = flume::bounded(1);
-    let options = Options { channel: channel.clone(), threads: Some(threads), after_paths, config: None };
+    let options = Options { channel: channel.clone(), ..options };
     let simulation = simulation.clone();
     let thread = std::thread::spawn(move || service::run(simulation, &options, &stopped).unwrap());
     Service { channel, stop, thread }

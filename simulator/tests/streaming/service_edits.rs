@@ -23,7 +23,7 @@ fn move_object(name: &str, keys: Value) -> Request {
 }
 
 /// The first frame from `number` on that satisfies `wanted`; `seen` is shown every frame on the way.
-fn frame_where(
+pub(crate) fn frame_where(
     subscriber: &mut Subscriber,
     number: u64,
     mut seen: impl FnMut(&VslFrame),
@@ -45,11 +45,11 @@ fn frame_where(
     panic!("no such frame within {PATIENCE:?}");
 }
 
-fn is_converged(frame: &VslFrame) -> bool {
+pub(crate) fn is_converged(frame: &VslFrame) -> bool {
     frame.statistics.converged == 1
 }
 
-fn flux(frame: &VslFrame) -> Vec<[f32; 3]> {
+pub(crate) fn flux(frame: &VslFrame) -> Vec<[f32; 3]> {
     frame.vsls.iter().map(|v| v.flux).collect()
 }
 
