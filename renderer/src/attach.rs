@@ -65,6 +65,7 @@ pub fn run(
         Run { args, renderer, cancelled, written, scene: PublishedScene::default(), pictures: 0, last: None };
     let Some(mut subscriber) = attach(args, &stop)? else { return Ok(run.report(Ended::Cancelled)) };
     let mut told = None;
+    let mut noticed = String::new();
     let mut pending = false;
     let mut newest = Instant::now();
     loop {
@@ -74,7 +75,10 @@ pub fn run(
         // Asked before reading: what was published before the channel was closed is then read.
         let liveness = subscriber.liveness();
         match subscriber.read() {
-            Ok(Reading::New) => (pending, newest) = (true, Instant::now()),
+            Ok(Reading::New) => {
+                (pending, newest) = (true, Instant::now());
+                tell_notice(&mut noticed, args, subscriber.frame().map_or("", |frame| &frame.notice));
+            }
             Ok(_) => {}
             Err(error) => tell(&mut told, format!("{error}; the last frame is kept")),
         }
@@ -126,6 +130,20 @@ fn tell(told: &mut Option<String>, message: String) {
         tracing::warn!("{message}");
         *told = Some(message);
     }
+}
+
+/// Logs what is wrong with the simulation, once for as long as it stays wrong.
+fn tell_notice(noticed: &mut String, args: &Args, notice: &str) {
+    if noticed == notice {
+        return;
+    }
+    let channel = &args.channel;
+    if notice.is_empty() {
+        tracing::info!("channel {channel}: what was wrong with the simulation is not any more");
+    } else {
+        tracing::warn!("channel {channel}: {notice}");
+    }
+    notice.clone_into(noticed);
 }
 
 fn tell_liveness(told: &mut Option<String>, args: &Args, liveness: &Liveness) {

@@ -14,6 +14,7 @@ pub mod program;
 pub mod published;
 mod rendered;
 pub mod shadow_rays;
+pub mod telemetry;
 mod vsl;
 mod watch;
 

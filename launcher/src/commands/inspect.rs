@@ -9,8 +9,9 @@ use crate::{
     signals::Listener,
 };
 use photonstream_protocol::{
-    ABI_MAJOR, ABI_MINOR, ChannelName, Liveness, Subscriber, VslFrame, monotonic_ns,
+    ABI_MAJOR, ABI_MINOR, ChannelName, Liveness, Reading, Subscriber, VslFrame, monotonic_ns,
 };
+use photonstream_renderer::telemetry::{ChangeTimes, LightAge};
 use photonstream_scene::Scene;
 use serde::Serialize;
 use std::{
@@ -24,10 +25,17 @@ use std::{
 With --watch a report follows every second until Ctrl-C; with --json as well, each is one line.
 
 JSON: { \"channel\", \"state\": live | paused | stalled | gone | retired, \"state_reason\", \"abi\", \"epoch\", \"frame\",
-  \"config_generation\", \"frame_age_ms\", \"latency_ms\": from the last tracing to its publication, \"scene\", \"scene_hash\",
+  \"config_generation\", \"notice\": what is wrong with the simulation, or null, \"frame_age_ms\", \"scene\", \"scene_hash\",
   \"vsls\", \"objects\", \"lights\", \"threads\", \"converged\", \"simulation_time_s\", \"paths_total\", \"rays_total\",
   \"deposits_total\", \"escaped\", \"rejected\", \"truncated\", \"absorbed_back\", \"paths_per_s\", \"rays_per_s\",
-  \"deposits_per_s\", \"pool_paths\", \"pool_valid\", \"stale_share\", \"total_flux_w\": [r, g, b],
+  \"deposits_per_s\", \"pool_paths\": slots of the pool in use, \"pool_capacity\": at most, \"pool_valid\",
+  \"refined_paths\": samples beyond the pool, \"stale_share\": of the pool, in [0, 1], \"mean_age_s\" and \"greatest_age_s\": of
+  the paths behind lit VSLs, \"relative_error\": standard error of the flux, weighted by flux, \"target_error\": or null,
+  \"retraced_paths\" and \"rays_saved\": because of edits, since the start, \"latency_ms\": from the last change until all its
+  light was traced, as the simulator measured it, or null, \"latency_target_ms\": or null, \"change\": null before the first,
+  or { \"age_ms\", \"traced_ms\", \"published_ms\", \"settled_ms\": from the arrival of the last change until its light was
+  traced, a frame with it published, and one with all its light; null where that is not over, or was before this report
+  began (--watch sees it) }, \"total_flux_w\": [r, g, b],
   \"decisions\": [ { \"what\", \"modelled\", \"reason\" } ] }")]
 pub(crate) struct Args {
     /// Channel of the simulation
@@ -47,8 +55,8 @@ struct Report {
     epoch: u64,
     frame: u64,
     config_generation: u64,
+    notice: Option<String>,
     frame_age_ms: f64,
-    latency_ms: f64,
     scene: String,
     scene_hash: String,
     vsls: usize,
@@ -68,22 +76,44 @@ struct Report {
     rays_per_s: f64,
     deposits_per_s: f64,
     pool_paths: u64,
+    pool_capacity: u64,
     pool_valid: u64,
+    refined_paths: u64,
     stale_share: f64,
+    mean_age_s: f64,
+    greatest_age_s: f64,
+    relative_error: f64,
+    target_error: Option<f64>,
+    retraced_paths: u64,
+    rays_saved: u64,
+    latency_ms: Option<f64>,
+    latency_target_ms: Option<f64>,
+    change: Option<Change>,
     total_flux_w: [f64; 3],
     decisions: Vec<Feature>,
+}
+
+/// Times from the arrival of the last change, in ms.
+#[derive(Serialize)]
+struct Change {
+    age_ms: f64,
+    traced_ms: Option<f64>,
+    published_ms: Option<f64>,
+    settled_ms: Option<f64>,
 }
 
 const PERIOD: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let mut subscriber = follow::present_frame(&args.channel)?;
+    let mut changes = ChangeTimes::default();
+    subscriber.frame().into_iter().for_each(|frame| changes.see(frame));
     if !args.watch {
-        return output::report(global.json, &report(args, &subscriber)?, text);
+        return output::report(global.json, &report(args, &subscriber, &changes)?, text);
     }
     let ended = Listener::flag_only()?;
     while !ended.load(Ordering::Relaxed) {
-        let report = report(args, &subscriber)?;
+        let report = report(args, &subscriber, &changes)?;
         if global.json {
             let line = serde_json::to_string(&report).map_err(|e| LauncherError::Output(e.into()))?;
             output::line(line)?;
@@ -96,14 +126,16 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         let next = Instant::now() + PERIOD;
         while Instant::now() < next && !ended.load(Ordering::Relaxed) {
             subscriber.wait((next - Instant::now()).min(Duration::from_millis(50)));
-            subscriber.read()?;
+            if subscriber.read()? == Reading::New {
+                subscriber.frame().into_iter().for_each(|frame| changes.see(frame));
+            }
         }
     }
     // To watch until Ctrl-C is what was asked for.
     std::process::exit(i32::from(exit::OK));
 }
 
-fn report(args: &Args, subscriber: &Subscriber) -> Result<Report, LauncherError> {
+fn report(args: &Args, subscriber: &Subscriber, changes: &ChangeTimes) -> Result<Report, LauncherError> {
     let frame = subscriber.frame().expect("invariant: present_frame waits for one");
     let scene = Scene::from_resolved(&frame.scene_text)?;
     let (state, state_reason) = match subscriber.liveness() {
@@ -114,7 +146,9 @@ fn report(args: &Args, subscriber: &Subscriber) -> Result<Report, LauncherError>
         Liveness::Retired => ("retired", None),
     };
     let s = &frame.statistics;
-    let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-6;
+    let now_ns = monotonic_ns();
+    let light = LightAge::of(frame);
+    let some = |value: f64| (value > 0.0).then_some(value);
     Ok(Report {
         channel: args.channel.to_string(),
         state,
@@ -123,8 +157,8 @@ fn report(args: &Args, subscriber: &Subscriber) -> Result<Report, LauncherError>
         epoch: frame.epoch,
         frame: frame.frame,
         config_generation: frame.config_generation,
-        frame_age_ms: ms(frame.publish_time_ns, monotonic_ns()),
-        latency_ms: ms(s.traced_ns, s.published_ns.max(s.traced_ns)),
+        notice: (!frame.notice.is_empty()).then(|| frame.notice.to_string()),
+        frame_age_ms: now_ns.saturating_sub(frame.publish_time_ns) as f64 * 1e-6,
         scene: scene.name.clone(),
         scene_hash: format!("{:016x}", frame.scene_hash),
         vsls: frame.vsls.len(),
@@ -144,8 +178,24 @@ fn report(args: &Args, subscriber: &Subscriber) -> Result<Report, LauncherError>
         rays_per_s: s.rays_per_s,
         deposits_per_s: s.deposits_per_s,
         pool_paths: s.pool_paths,
+        pool_capacity: s.pool_capacity,
         pool_valid: s.pool_valid,
+        refined_paths: s.refined_paths,
         stale_share: s.stale_share,
+        mean_age_s: light.mean_s,
+        greatest_age_s: light.greatest_s,
+        relative_error: light.relative_error,
+        target_error: some(s.target_error),
+        retraced_paths: s.retraced_paths,
+        rays_saved: s.rays_saved,
+        latency_ms: some(s.latency_ms),
+        latency_target_ms: some(s.latency_target_ms),
+        change: changes.ago_ms(now_ns).map(|age_ms| Change {
+            age_ms,
+            traced_ms: changes.traced_ms(),
+            published_ms: changes.published_ms(),
+            settled_ms: changes.settled_ms(),
+        }),
         total_flux_w: total_flux(frame),
         decisions: scene.features.decisions().into_iter().map(Feature::from).collect(),
     })
@@ -169,6 +219,7 @@ fn text(r: &Report) -> String {
         r.frame,
         r.config_generation,
     );
+    out.extend(r.notice.iter().map(|notice| format!("notice   {}\n", notice.replace('\n', "\n         "))));
     out.push_str(&format!(
         "scene    {} (hash {}): {} VSLs, {} objects, {} lights\n",
         r.scene,
@@ -196,16 +247,41 @@ fn text(r: &Report) -> String {
         grouped(r.rejected)
     ));
     out.push_str(&format!(
-        "pool     {} of {} paths, {:.1} % stale; leaving the surfaces: {red:.3}, {green:.3}, {blue:.3} W\n",
+        "pool     {} of {} paths{}, {} beyond the pool; leaving the surfaces: {red:.3}, {green:.3}, {blue:.3} W\n",
         grouped(r.pool_valid),
         grouped(r.pool_paths),
-        r.stale_share * 100.0
+        if r.pool_capacity > r.pool_paths { format!(" (at most {})", grouped(r.pool_capacity)) } else { String::new() },
+        grouped(r.refined_paths),
     ));
     out.push_str(&format!(
-        "age      {:.1} ms, published {:.2} ms after tracing\n",
-        r.frame_age_ms, r.latency_ms
+        "light    {:.1} % of the paths stale, {:.1} s old in the mean and {:.1} s at most; standard error {:.2} %{}\n",
+        r.stale_share * 100.0,
+        r.mean_age_s,
+        r.greatest_age_s,
+        r.relative_error * 100.0,
+        r.target_error.map_or_else(String::new, |target| format!(" (target {:.2} %)", target * 100.0)),
     ));
+    out.push_str(&change(r));
+    out.push_str(&format!("age      {:.1} ms since the last frame\n", r.frame_age_ms));
     out.push_str("modelled:\n");
     out.extend(r.decisions.iter().map(Feature::line));
     out
+}
+
+/// What is known of the last change and of what changes cost.
+fn change(r: &Report) -> String {
+    let Some(change) = &r.change else { return "change   none yet\n".into() };
+    let ms =
+        |what: &str, ms: Option<f64>| ms.map_or_else(String::new, |ms| format!(", {what} after {ms:.1} ms"));
+    let target = r.latency_target_ms.map_or_else(String::new, |ms| format!(" (target {ms:.0} ms)"));
+    format!(
+        "change   {:.1} s ago{}{}{}{}{target}; {} paths traced again, {} rays saved\n",
+        change.age_ms * 1e-3,
+        ms("published", change.published_ms),
+        ms("traced", change.traced_ms),
+        ms("all its light published", change.settled_ms),
+        if change.traced_ms.is_none() { ", not yet traced" } else { "" },
+        grouped(r.retraced_paths),
+        grouped(r.rays_saved),
+    )
 }

@@ -15,6 +15,7 @@ use crate::{
     pointer::Pointer,
 };
 use photonstream_protocol::{Liveness, Request};
+use photonstream_renderer::telemetry::{ChangeTimes, LightAge};
 use photonstream_renderer_wgpu::{PassTime, View};
 use photonstream_scene::{LightId, ObjectId, Scene, bvh::Ray};
 use std::time::{Duration, Instant};
@@ -56,6 +57,10 @@ pub(crate) struct Session {
     pub(crate) shows_help: bool,
     pub(crate) notices: Notices,
     pub(crate) latency: Latency,
+    /// How old and how noisy the published light is.
+    pub(crate) light: LightAge,
+    /// When the last change arrived, was traced and was published.
+    pub(crate) changes: ChangeTimes,
     pub(crate) effort: Effort,
     pub(crate) flaws: Flaws,
     /// Whether the picture is of an earlier frame, since the device refused the published one.
@@ -94,6 +99,8 @@ impl Session {
             shows_help: false,
             notices: Notices::default(),
             latency: Latency::default(),
+            light: LightAge::default(),
+            changes: ChangeTimes::default(),
             effort: Effort::default(),
             flaws: Flaws::default(),
             is_behind: false,
@@ -114,6 +121,8 @@ impl Session {
     pub(crate) fn accept(&mut self, news: News) {
         (self.connection, self.problem) = (news.connection, news.problem);
         let Some(published) = news.published else { return };
+        self.light = LightAge::of(&published.frame);
+        self.changes.see(&published.frame);
         let scene = &published.scene;
         let is_moved = self.navigation.as_ref().is_none_or(|n| *n.home() != scene.camera);
         if is_moved {

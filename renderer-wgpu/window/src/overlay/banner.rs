@@ -11,6 +11,8 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
         banner(&session.connection, session.args.channel.as_str(), session.published.is_some())
             .into_iter()
             .collect();
+    let published = session.published.as_ref().map(|published| &*published.frame.notice);
+    lines.extend(published.filter(|notice| !notice.is_empty()).map(|notice| (notice.to_owned(), true)));
     lines.extend(session.problem.iter().map(|problem| (problem.clone(), true)));
     let (notices, next) = session.notices.now(now);
     lines.extend(notices.iter().map(|notice| (notice.text.clone(), notice.is_error)));

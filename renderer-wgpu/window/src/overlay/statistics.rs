@@ -39,26 +39,54 @@ fn lines(session: &Session) -> Vec<(&'static str, String)> {
     if let Some(published) = &session.published {
         let frame = &published.frame;
         let statistics = &frame.statistics;
-        let state = if statistics.converged != 0 {
-            "converged".to_owned()
-        } else {
-            format!("{:.0} % stale", 100.0 * statistics.stale_share)
+        let state = if statistics.converged != 0 { "converged" } else { "settling" };
+        let percent = |share: f64| format!("{:.*} %", if share < 0.1 { 2 } else { 0 }, 100.0 * share);
+        let error = match statistics.target_error {
+            target if target > 0.0 => {
+                format!("{} of {}", percent(session.light.relative_error), percent(target))
+            }
+            _ => percent(session.light.relative_error),
         };
         lines.extend([
             ("VSLs", frame.vsls.len().to_string()),
             ("photons/s", short(statistics.paths_per_s)),
             ("rays/s", short(statistics.rays_per_s)),
-            ("light", state),
+            ("light", state.to_owned()),
+            ("stale paths", percent(statistics.stale_share)),
+            ("error of light", error),
+            ("age of light", format!("{:.1} s, most {:.1}", session.light.mean_s, session.light.greatest_s)),
             ("published frame", frame.frame.to_string()),
         ]);
     }
     if let Some(noise) = session.flaws.noise() {
         lines.push(("noise of rays", format!("{:.2} %", 100.0 * noise)));
     }
+    lines.extend(changes(session));
     if session.latency.is_known() {
         lines.push(("change to published", format!("{:.1} ms", session.latency.published_ms)));
         lines.push(("published to shown", format!("{:.1} ms", session.latency.shown_ms)));
     }
+    lines
+}
+
+/// What the last change took, and what changes have cost so far.
+fn changes(session: &Session) -> Vec<(&'static str, String)> {
+    let changes = &session.changes;
+    let Some(published) = session.published.as_ref().filter(|_| changes.is_known()) else {
+        return Vec::new();
+    };
+    let statistics = &published.frame.statistics;
+    let target = match statistics.latency_target_ms {
+        target if target > 0.0 => format!(" of {target:.0}"),
+        _ => String::new(),
+    };
+    let traced = changes.traced_ms().map_or_else(|| "not yet".to_owned(), |ms| format!("{ms:.1}{target} ms"));
+    let mut lines = vec![("change to traced", traced)];
+    lines.extend(changes.settled_ms().map(|ms| ("… and published", format!("{ms:.1} ms"))));
+    lines.extend([
+        ("paths traced again", short(statistics.retraced_paths as f64)),
+        ("rays saved", short(statistics.rays_saved as f64)),
+    ]);
     lines
 }
 
