@@ -69,6 +69,12 @@ pub(crate) enum Command {
     Compare(compare::Args),
     /// Show what a running simulation does
     Inspect(inspect::Args),
+    /// Change a running simulation: lights, objects, materials, time
+    Set(set::Args),
+    /// Record the frames of a running simulation
+    Record(record::Args),
+    /// Publish the frames of a recording again
+    Replay(replay::Args),
     /// Validate a scene and say what will be modelled, and why
     Check(check::Args),
     /// List what is running, and what a crash left

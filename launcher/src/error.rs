@@ -1,9 +1,10 @@
 //! Turns everything that can end a command early into one message and one exit code.
 
-use crate::exit;
+use crate::{assignment::AssignmentError, exit};
 use photonstream_evaluation::MetricsError;
 use photonstream_film::FilmError;
 use photonstream_protocol::ProtocolError;
+use photonstream_recording::RecordingError;
 use photonstream_renderer::RenderError;
 use photonstream_scene::SceneError;
 use photonstream_simulator::error::SimulatorError;
@@ -28,6 +29,9 @@ pub(crate) enum LauncherError {
     #[cfg(feature = "window")]
     #[error(transparent)]
     Window(#[from] photonstream_window::WindowError),
+    /// A recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// A picture.
     #[error(transparent)]
     Film(#[from] FilmError),
@@ -37,6 +41,21 @@ pub(crate) enum LauncherError {
     /// Arguments that contradict each other.
     #[error("{0}")]
     Usage(String),
+    /// A change that cannot be understood.
+    #[error(transparent)]
+    Assignment(#[from] AssignmentError),
+    /// A change that the simulator refused.
+    #[error("{what} was refused on channel '{channel}' ({code}): {message}")]
+    Refused {
+        /// What was to change.
+        what: String,
+        /// The channel.
+        channel: String,
+        /// One word for programs.
+        code: String,
+        /// One sentence for people.
+        message: String,
+    },
     /// A renderer that is neither built in nor found.
     #[error(
         "no renderer is called \"{name}\": built in is {built_in}; looked for the plug-in {file} in {looked}; \
@@ -124,7 +143,7 @@ impl LauncherError {
             #[cfg(feature = "window")]
             Self::Window(error) if error.is_of_device() => exit::DEVICE,
             Self::Interrupted => exit::INTERRUPTED,
-            Self::Usage(_) | Self::UnknownRenderer { .. } => exit::USAGE,
+            Self::Usage(_) | Self::Assignment(_) | Self::UnknownRenderer { .. } => exit::USAGE,
             Self::Child { code, .. } => *code,
             Self::SimulatorEnded { .. } => exit::CHILD,
             _ => exit::FAILED,

@@ -5,6 +5,7 @@
 //! `commands` has a file for each, `supervise` keeps child processes alive.
 #![forbid(unsafe_code)]
 
+mod assignment;
 mod backend;
 mod cli;
 mod commands;
@@ -15,9 +16,13 @@ mod log;
 mod output;
 mod owned;
 mod pictures;
+mod player;
 mod progress;
+mod requests;
 mod signals;
+mod span;
 mod supervise;
+mod taking;
 mod window;
 
 use clap::Parser;

@@ -154,3 +154,17 @@ fn a_full_queue_says_so() {
         "a late reply is not taken for another: {answer:?}"
     );
 }
+
+/// 50 simulators that end right after their last reply: each client gets it.
+#[test]
+fn the_last_reply_arrives_before_the_end() {
+    for _ in 0..50 {
+        let simulator = start();
+        let mut client = ControlClient::connect_in(&simulator.runtime, &simulator.channel).unwrap();
+        let asking = std::thread::spawn(move || client.request(&Request::Shutdown, LIMIT));
+        let Incoming { replier, .. } = simulator.server.requests().recv_timeout(LIMIT).unwrap();
+        replier.reply(Reply::Ok { frame: 7 });
+        drop(simulator);
+        assert_eq!(asking.join().unwrap().unwrap(), Reply::Ok { frame: 7 });
+    }
+}

@@ -7,10 +7,13 @@ pub(crate) mod clean;
 pub(crate) mod compare;
 pub(crate) mod default_run;
 pub(crate) mod inspect;
+pub(crate) mod record;
 pub(crate) mod reference;
 pub(crate) mod render;
 pub(crate) mod renderer;
+pub(crate) mod replay;
 pub(crate) mod run;
+pub(crate) mod set;
 pub(crate) mod simulate;
 #[cfg(feature = "window")]
 pub(crate) mod view;
@@ -36,6 +39,9 @@ pub(crate) fn dispatch(program: Program) -> Result<(), LauncherError> {
         Some(Command::Reference(args)) => reference::run(&args, global),
         Some(Command::Compare(args)) => compare::run(&args, global),
         Some(Command::Inspect(args)) => inspect::run(&args, global),
+        Some(Command::Record(args)) => record::run(&args, global),
+        Some(Command::Replay(args)) => replay::run(&args, global),
+        Some(Command::Set(args)) => set::run(&args, global),
         Some(Command::Check(args)) => check::run(&args, global),
         Some(Command::Channels(args)) => channels::run(&args, global),
         Some(Command::Clean(args)) => clean::run(&args, global),

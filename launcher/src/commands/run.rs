@@ -1,6 +1,9 @@
 //! Turns a scene into a simulator and renderers, each a process of its own, watched until their work is done.
 
-use super::render::{remove_channel, simulator, verbosity};
+use super::{
+    record,
+    render::{remove_channel, simulator, verbosity},
+};
 use crate::{
     backend::{self, BUILT_IN_RENDERERS, GpuArgs},
     cli::Global,
@@ -8,6 +11,7 @@ use crate::{
     follow, output,
     pictures::Look,
     supervise::{ChildOutput, Kind, Role, Sequence, Supervisor, find_plug_in, written_since},
+    taking::{Background, Taken},
     window::{self, WINDOW},
 };
 use photonstream_protocol::ChannelName;
@@ -36,7 +40,8 @@ Examples:
   photonstream run room.toml --renderer cpu --renderer mine --headless --frames 20 --out film
 
 JSON: { \"scene\", \"channel\", \"total_s\", \"simulator_restarts\", \"renderers\": [ { \"name\", \"folder\", \"pictures\": [paths],
-  \"restarts\", \"failed\", \"replaced_by\": null or a name } ] }")]
+  \"restarts\", \"failed\", \"replaced_by\": null or a name } ], \"recording\": null or { \"file\", \"frames\", \"skipped_frames\",
+  \"bytes\", \"seconds\" } }")]
 pub(crate) struct Args {
     /// Scene [default: the built-in Cornell box]
     config: Option<PathBuf>,
@@ -56,6 +61,9 @@ pub(crate) struct Args {
     /// Channel to publish on [default: one of its own]
     #[arg(long)]
     channel: Option<ChannelName>,
+    /// Record the frames of the simulation, from the first one, for `photonstream replay`
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     look: Look,
     #[command(flatten)]
@@ -71,6 +79,7 @@ struct Report {
     total_s: f64,
     simulator_restarts: u32,
     renderers: Vec<Renderer>,
+    recording: Option<Taken>,
 }
 
 #[derive(Serialize)]
@@ -98,6 +107,7 @@ impl Args {
             frames: None,
             out: "out".into(),
             channel: None,
+            record: None,
             look: Look::default(),
             gpu: GpuArgs::default(),
             overrides: Overrides::default(),
@@ -133,15 +143,21 @@ pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(),
         std::fs::create_dir_all(folder).map_err(|e| LauncherError::io("create folder", folder, e))?;
     }
     let output = if global.json { ChildOutput::Aside } else { ChildOutput::Through };
+    let recording = args.record.as_ref().map(|file| Background::start(file, &channel)).transpose()?;
     let mut supervisor = Supervisor::new(output)?;
     let result = supervisor.start(simulator(config, &channel, &args.overrides, None, global));
     let result = result.and_then(|()| watch(&mut supervisor, &channel, renderers));
     supervisor.end();
+    let recorded = recording.map(Background::finish).transpose();
     let left_over = supervisor.fates(Kind::Simulator).iter().any(|fate| fate.crashed);
     if args.channel.is_none() || left_over {
         remove_channel(&channel);
     }
     result?;
+    let (recording, lost) = match recorded {
+        Ok(taken) => (taken.flatten(), None),
+        Err(error) => (None, Some(error)),
+    };
     let fates = supervisor.fates(Kind::Renderer);
     let renderers = names.iter().zip(folders).zip(fates).map(|((name, folder), fate)| Renderer {
         name: name.clone(),
@@ -157,9 +173,10 @@ pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(),
         total_s: begun.0.elapsed().as_secs_f64(),
         simulator_restarts: supervisor.fates(Kind::Simulator).iter().map(|fate| fate.restarts).sum(),
         renderers: renderers.collect(),
+        recording,
     };
     output::report(global.json, &report, text)?;
-    supervisor.take_failure().map_or(Ok(()), Err)
+    supervisor.take_failure().or(lost).map_or(Ok(()), Err)
 }
 
 /// What is started to show the light: the renderers that were named, else a window if there can be one, else `cpu`.
@@ -312,6 +329,7 @@ fn text(report: &Report) -> String {
         }
     }
     let restarts: u32 = report.renderers.iter().map(|r| r.restarts).sum();
+    out.extend(report.recording.iter().map(|taken| format!("{}\n", record::text(taken))));
     out.push_str(&format!("{}: {:.2} s", report.scene, report.total_s));
     if report.simulator_restarts + restarts > 0 {
         out.push_str(&format!("; restarts: simulator {}, renderers {restarts}", report.simulator_restarts));

@@ -11,4 +11,6 @@ mod kills;
 mod main_job;
 mod messages;
 mod plug_ins;
+mod replay;
 mod reports;
+mod set;

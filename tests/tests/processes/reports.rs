@@ -2,8 +2,21 @@
 
 use crate::harness::{Ground, config, has_keys};
 
-const COMMANDS: [&str; 10] =
-    ["run", "simulate", "render", "reference", "compare", "inspect", "check", "channels", "clean", "bench"];
+const COMMANDS: [&str; 13] = [
+    "run",
+    "simulate",
+    "render",
+    "reference",
+    "compare",
+    "inspect",
+    "record",
+    "replay",
+    "set",
+    "check",
+    "channels",
+    "clean",
+    "bench",
+];
 
 #[test]
 fn every_command_has_help() {
@@ -74,8 +87,8 @@ fn json_reports_have_their_documented_keys() {
     );
 
     let run = ground.json(&[&["run", &scene, "--headless", "--size", "8x8", "--json"], &small[..]].concat());
-    has_keys(&run, &keys("scene channel total_s simulator_restarts renderers"));
-    has_keys(&run["renderers"][0], &keys("name folder pictures restarts failed"));
+    has_keys(&run, &keys("scene channel total_s simulator_restarts renderers recording"));
+    has_keys(&run["renderers"][0], &keys("name folder pictures restarts failed replaced_by"));
 
     has_keys(&ground.json(&["channels", "--json"]), &keys("runtime_dir channels"));
     has_keys(&ground.json(&["clean", "--json"]), &keys("removed"));
@@ -91,9 +104,11 @@ fn json_reports_have_their_documented_keys() {
     has_keys(
         &inspect,
         &keys(
-            "channel state state_reason abi epoch frame config_generation frame_age_ms latency_ms scene scene_hash vsls \
+            "channel state state_reason abi epoch frame config_generation notice frame_age_ms scene scene_hash vsls \
              objects lights threads converged simulation_time_s paths_total rays_total deposits_total escaped rejected \
-             truncated absorbed_back paths_per_s rays_per_s deposits_per_s pool_paths pool_valid stale_share \
+             truncated absorbed_back paths_per_s rays_per_s deposits_per_s pool_paths pool_capacity pool_valid \
+             refined_paths stale_share mean_age_s greatest_age_s relative_error target_error retraced_paths rays_saved \
+             latency_ms latency_target_ms change \
              total_flux_w decisions",
         ),
     );

@@ -48,15 +48,25 @@ impl EventLoop {
                     connection.receive();
                 }
             }
-            while let Ok((id, reply)) = self.replies.try_recv() {
-                if let Some(connection) = self.connections.get_mut(&id) {
-                    connection.waiting = false;
-                    connection.queue(&reply);
-                }
-            }
+            self.take_replies();
             let ids: Vec<u64> = self.connections.keys().copied().collect();
             for id in ids {
                 self.serve(id);
+            }
+        }
+        // Who asked for the end is told that it comes, if there is room for it in the socket.
+        self.take_replies();
+        for connection in self.connections.values_mut() {
+            connection.send();
+        }
+    }
+
+    /// Hands the replies that were given to their connections.
+    fn take_replies(&mut self) {
+        while let Ok((id, reply)) = self.replies.try_recv() {
+            if let Some(connection) = self.connections.get_mut(&id) {
+                connection.waiting = false;
+                connection.queue(&reply);
             }
         }
     }

@@ -153,12 +153,8 @@ fn a_window_shows_what_is_published_and_follows_the_hands_of_its_user() {
 fn a_lost_device_is_opened_again_and_the_frames_asked_for_are_counted() {
     let Some((display, mut renderer)) = ready() else { return };
     let mut simulator = Simulator::start("lost-device");
-    let mut window = Window::open(
-        &display,
-        simulator.channel(),
-        SIZE,
-        &["--visibility", "none", "--fault", "device@1"],
-    );
+    let mut window =
+        Window::open(&display, simulator.channel(), SIZE, &["--visibility", "none", "--fault", "device@1"]);
     window.wait("the device's loss", |w| w.said("it was opened again"));
     window.rest(&mut simulator);
     compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
