@@ -10,6 +10,7 @@ mod harness;
 mod kills;
 mod main_job;
 mod messages;
+mod notices;
 mod plug_ins;
 mod replay;
 mod reports;
