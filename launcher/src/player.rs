@@ -50,6 +50,8 @@ pub(crate) struct Player<'a> {
     pub(crate) is_paused: bool,
     /// Frames that were shown, and how often the recording began again.
     pub(crate) shown: u64,
+    /// Number of the frame in the recording that was shown last.
+    pub(crate) at: u64,
     pub(crate) rounds: u64,
     /// What ended the recording before its end.
     pub(crate) damage: Option<RecordingError>,
@@ -92,6 +94,7 @@ impl Player<'_> {
         let frame = self.recording.frame();
         let number = self.playback.show(frame)?;
         self.shown += 1;
+        self.at = self.recording.position() - 1;
         if let Some(replier) = replier {
             replier.reply(Reply::Ok { frame: number });
         }
@@ -174,7 +177,7 @@ impl Player<'_> {
                 state: json!({
                     "replay": self.file,
                     "paused": self.is_paused,
-                    "recorded_frame": self.recording.position() - 1,
+                    "recorded_frame": self.at,
                     "shown": self.shown,
                     "speed": self.manner.speed,
                 }),

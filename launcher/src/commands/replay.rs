@@ -97,6 +97,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         stop: &stop,
         is_paused,
         shown: 0,
+        at: 0,
         rounds: 0,
         damage: None,
     };

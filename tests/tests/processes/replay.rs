@@ -5,7 +5,7 @@ use photonstream_film::Film;
 use photonstream_protocol::{AccessMode, ControlClient, Liveness, Reply, Request, Runtime, Subscriber};
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use std::{fs, time::Duration};
+use std::{fs, io::Write, process::Stdio, time::Duration};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -124,6 +124,22 @@ fn a_run_is_recorded_and_stepped_through() {
     assert_eq!(code(client.request(&Request::Step, PATIENCE).unwrap()), "not-paused");
     replay.signal(Signal::TERM);
     replay.wait().expect(0, &[]);
+
+    // Two presses of Enter, and an end of the input that is none.
+    let mut command =
+        ground.command(&["replay", "run.photons", "--channel", "enter", "--step", "--loop", "--json"]);
+    command.stdin(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    child.stdin.take().unwrap().write_all(b"\n\n").unwrap();
+    let mut client = connect(&ground, "enter");
+    wait_for("three frames", || match client.request(&Request::Query, PATIENCE).unwrap() {
+        Reply::State { state } => (state["shown"] == 3).then_some(()),
+        other => panic!("{other:?}"),
+    });
+    client.request(&Request::Shutdown, PATIENCE).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["shown_frames"], &report["ending"]), (&json!(3), &json!("shutdown")), "{output:?}");
 
     let fast = ["replay", "run.photons", "--channel", "fast", "--speed", "1e6", "--json"];
     let report = ground.json(&fast);

@@ -6,6 +6,8 @@ use crate::{
     session::{Effort, Session},
 };
 use egui::{Context, Grid, RichText, Ui, pos2};
+use photonstream_protocol::StatisticsRecord;
+use photonstream_renderer::telemetry::ChangeTimes;
 
 pub(super) fn show(ctx: &Context, session: &Session, machine: &Machine) {
     window(ctx, "Figures", pos2(right(ctx) - 250.0, 8.0)).default_width(234.0).show(ctx, |ui| {
@@ -57,11 +59,11 @@ fn lines(session: &Session) -> Vec<(&'static str, String)> {
             ("age of light", format!("{:.1} s, most {:.1}", session.light.mean_s, session.light.greatest_s)),
             ("published frame", frame.frame.to_string()),
         ]);
+        lines.extend(changes(&session.changes, statistics));
     }
     if let Some(noise) = session.flaws.noise() {
         lines.push(("noise of rays", format!("{:.2} %", 100.0 * noise)));
     }
-    lines.extend(changes(session));
     if session.latency.is_known() {
         lines.push(("change to published", format!("{:.1} ms", session.latency.published_ms)));
         lines.push(("published to shown", format!("{:.1} ms", session.latency.shown_ms)));
@@ -70,12 +72,10 @@ fn lines(session: &Session) -> Vec<(&'static str, String)> {
 }
 
 /// What the last change took, and what changes have cost so far.
-fn changes(session: &Session) -> Vec<(&'static str, String)> {
-    let changes = &session.changes;
-    let Some(published) = session.published.as_ref().filter(|_| changes.is_known()) else {
+fn changes(changes: &ChangeTimes, statistics: &StatisticsRecord) -> Vec<(&'static str, String)> {
+    if !changes.is_known() {
         return Vec::new();
-    };
-    let statistics = &published.frame.statistics;
+    }
     let target = match statistics.latency_target_ms {
         target if target > 0.0 => format!(" of {target:.0}"),
         _ => String::new(),
@@ -117,6 +117,7 @@ fn short(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use photonstream_protocol::VslFrame;
 
     #[test]
     fn rates_are_short() {
@@ -124,5 +125,26 @@ mod tests {
             [0.0, 999.0, 1234.0, 56_789.0, 1.5e6, 3e9].map(short),
             ["0", "999", "1.23 k", "56.8 k", "1.50 M", "3.00 G"]
         );
+    }
+
+    #[test]
+    fn a_change_is_told_once_it_is_known() {
+        let mut frame = VslFrame::default();
+        let mut times = ChangeTimes::default();
+        times.see(&frame);
+        assert!(changes(&times, &frame.statistics).is_empty());
+        let statistics = &mut frame.statistics;
+        (statistics.edit_received_ns, statistics.published_ns) = (1_000_000, 4_000_000);
+        (statistics.stale_share, statistics.latency_target_ms) = (0.5, 20.0);
+        statistics.rays_saved = 12_345;
+        times.see(&frame);
+        let told = changes(&times, &frame.statistics);
+        assert_eq!(told[0], ("change to traced", "not yet".to_owned()));
+        (frame.statistics.traced_ns, frame.statistics.published_ns) = (7_500_000, 9_000_000);
+        frame.statistics.stale_share = 0.0;
+        times.see(&frame);
+        let told = changes(&times, &frame.statistics);
+        let expected = ["6.5 of 20 ms", "8.0 ms", "0", "12.3 k"];
+        assert_eq!(told.iter().map(|(_, value)| value.as_str()).collect::<Vec<_>>(), expected);
     }
 }
