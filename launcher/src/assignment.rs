@@ -146,11 +146,7 @@ impl Assignment {
             let indent = begin + (text[begin..].len() - text[begin..].trim_start().len());
             let within = error.span().map_or(0, |span| span.start.saturating_sub("value = ".len()));
             let what = error.message().lines().next().unwrap_or("no TOML").to_owned();
-            wrong(
-                indent + within,
-                what,
-                "write a TOML value, a text with quotes within those of the shell: 'KEY=\"text\"'",
-            )
+            wrong(indent + within, what, "write a TOML value (a text as 'KEY=\"text\"')")
         })?;
         let value = Some(parsed).filter(|table| table.len() == 1);
         let value = value.and_then(|mut table| table.remove("value")).and_then(json);
