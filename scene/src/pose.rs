@@ -58,11 +58,6 @@ impl Pose {
     pub(crate) fn world_from_rest(&self, centre: DVec3) -> DAffine3 {
         DAffine3 { matrix3: self.rotation, translation: self.offset + self.rotation * centre }
     }
-
-    /// The pose at the same size that gives `motion` from the rest space around `centre`, to the rounding of f64.
-    pub(crate) fn moved(self, motion: &DAffine3, centre: DVec3) -> Self {
-        Self { rotation: motion.matrix3, offset: motion.translation - motion.matrix3 * centre, ..self }
-    }
 }
 
 impl RestMesh {
@@ -71,6 +66,18 @@ impl RestMesh {
         // Rounding is monotone: the box of the scaled vertices is the scaled box.
         let (a, b) = (scale * self.used.0, scale * self.used.1);
         snapped_centre((a.min(b), a.max(b)))
+    }
+
+    /// The map from rest space as loaded to the scene's space: a rotation times what the size has grown by, then a shift.
+    /// At the size it was loaded with this is [`Pose::world_from_rest`], bit for bit.
+    pub(crate) fn world_from_loaded(&self, pose: &Pose) -> DAffine3 {
+        let (rotation, growth) = (pose.rotation, pose.scale / self.loaded.scale);
+        let matrix3 = DMat3::from_cols(
+            rotation.x_axis * growth.x,
+            rotation.y_axis * growth.y,
+            rotation.z_axis * growth.z,
+        );
+        DAffine3 { matrix3, translation: pose.offset + matrix3 * self.centre(self.loaded.scale) }
     }
 
     /// A vertex in rest space.

@@ -204,6 +204,18 @@ impl Scene {
         self.objects.binary_search_by(|o| o.name.as_str().cmp(name)).ok().map(|i| ObjectId(i as u32))
     }
 
+    /// The map from the rest space of an object as [`Scene::resolved_text`] loads it to the scene's space, m: a scale along
+    /// the object's axes (what its size has grown by, negative where an edit has mirrored it), a rotation, a shift.
+    ///
+    /// Equal to [`Object::world_from_rest`] at the size it was loaded with; [`Scene::with_object_placed`] takes it.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn world_from_loaded(&self, object: ObjectId) -> DAffine3 {
+        let index = object.0 as usize;
+        self.rest_meshes[index].world_from_loaded(&self.poses[index])
+    }
+
     /// The light called `name`.
     pub fn light(&self, name: &str) -> Option<LightId> {
         self.lights.binary_search_by(|l| l.name.as_str().cmp(name)).ok().map(|i| LightId(i as u32))

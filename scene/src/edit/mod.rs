@@ -3,6 +3,7 @@
 mod light;
 mod material;
 mod object;
+mod place;
 mod values;
 
 use crate::{
@@ -13,14 +14,11 @@ use crate::{
     pose::{self, Pose, RestMesh},
     scene::{Geometry, LightId, MaterialId, Object, ObjectId, Scene},
 };
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use photonstream_shading::{Light, surface};
 use std::{collections::BTreeMap, sync::Arc};
 
 pub(crate) use values::Values;
-
-/// Largest deviation of a rotation matrix from an orthonormal one.
-const ORTHONORMAL_TO: f64 = 1e-9;
 
 /// Edits of a scene: each is validated when it is made, and all are applied at once.
 ///
@@ -47,15 +45,17 @@ impl Scene {
         Ok(edit.finish())
     }
 
-    /// The scene with an object moved to where the rigid motion `world_from_rest` puts it; its emitting faces move along.
+    /// The scene with an object moved and scaled to where `world_from_loaded` puts it; its emitting faces move along.
     ///
-    /// An object put back where it was gives the scene as it was, bit for bit. Positions in the scene's space, m.
+    /// The map is that of [`Scene::world_from_loaded`]: from rest space as loaded to the scene's space, m, with orthogonal
+    /// axes. An object put back where it was gives the scene as it was, bit for bit.
     ///
     /// # Errors
-    /// If there is no such object, the motion is not rigid, or it leads beyond what f32 can hold.
-    pub fn with_object_placed(&self, id: ObjectId, world_from_rest: DAffine3) -> Result<Self, SceneError> {
+    /// If there is no such object, the axes are not orthogonal, a scale is beyond what a config may say, or the map leads
+    /// beyond what f32 can hold.
+    pub fn with_object_placed(&self, id: ObjectId, world_from_loaded: DAffine3) -> Result<Self, SceneError> {
         let mut edit = self.edit();
-        edit.place_object(id, world_from_rest)?;
+        edit.place_object(id, world_from_loaded)?;
         Ok(edit.finish())
     }
 }
@@ -87,11 +87,11 @@ impl SceneEdit {
         material::set(&mut self.scene, name, values)
     }
 
-    /// Moves an object; see [`Scene::with_object_placed`].
+    /// Moves and scales an object; see [`Scene::with_object_placed`].
     ///
     /// # Errors
     /// As [`Scene::with_object_placed`].
-    pub fn place_object(&mut self, id: ObjectId, world_from_rest: DAffine3) -> Result<(), SceneError> {
+    pub fn place_object(&mut self, id: ObjectId, world_from_loaded: DAffine3) -> Result<(), SceneError> {
         let document = Document::default();
         let field = Field::root(&document).key("object");
         let Some(object) = self.scene.objects.get(id.0 as usize) else {
@@ -102,27 +102,13 @@ impl SceneEdit {
                 "choose another object",
             ));
         };
-        let (now, current) = (self.scene.poses[id.0 as usize], self.pose(id));
-        if object.world_from_rest == world_from_rest && now.scale == current.scale {
-            self.poses.insert(id, now);
-            return Ok(());
-        }
-        let field = field.key(&object.name).key("world_from_rest");
-        let matrix = world_from_rest.matrix3;
-        let error = (matrix.transpose() * matrix - DMat3::IDENTITY).to_cols_array();
-        if !(error.iter().all(|x| x.abs() <= ORTHONORMAL_TO) && matrix.determinant() > 0.0) {
-            return Err(field.invalid(
-                matrix,
-                "a rotation: orthonormal columns, not mirrored",
-                "place objects by rigid motions",
-            ));
-        }
+        let field = field.key(&object.name).key("world_from_loaded");
         let mesh = &self.scene.rest_meshes[id.0 as usize];
-        let centre = mesh.centre(current.scale);
-        // Where it was loaded, exactly: a motion alone gives a pose to the rounding of f64.
-        let back =
-            mesh.loaded.scale == current.scale && mesh.loaded.world_from_rest(centre) == world_from_rest;
-        let pose = if back { mesh.loaded } else { current.moved(&world_from_rest, centre) };
+        // Poses that give this very map are taken as they are: a map alone gives a pose to the rounding of f64.
+        let pose = [self.scene.poses[id.0 as usize], mesh.loaded]
+            .into_iter()
+            .find(|pose| mesh.world_from_loaded(pose) == world_from_loaded)
+            .map_or_else(|| place::pose(mesh, &self.pose(id), &world_from_loaded, &field), Ok)?;
         self.pose_object(id, pose, &field)
     }
 
