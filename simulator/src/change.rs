@@ -4,7 +4,7 @@ use crate::{
     simulation::Simulation,
     trail::{Disturbance, Obstacle, Vertex},
 };
-use glam::Vec3;
+use glam::{Mat3A, Vec3};
 use photonstream_scene::{Object, Scene, Side};
 use photonstream_shading::LightShape;
 use std::sync::Arc;
@@ -108,12 +108,12 @@ pub(crate) fn reflects_alike(old: &Scene, before: &Object, new: &Scene, after: &
     albedo(old, before) == albedo(new, after) && sides(before) == sides(after)
 }
 
-/// The box around an object; `None` for one without triangles.
+/// What encloses an object; `None` for one without triangles.
 pub(crate) fn obstacle(scene: &Scene, object: &Object, reach: f32) -> Option<Obstacle> {
-    let mut corners = object.triangles.clone().flat_map(|t| scene.geometry.triangle(t));
-    let first = corners.next()?;
-    let (low, high) = corners.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
-    Some(Obstacle::new(low, high, reach))
+    let corners = object.triangles.clone().flat_map(|t| scene.geometry.triangle(t));
+    // Its own axes turn with it.
+    let turn = Mat3A::from(object.world_from_rest.matrix3.as_mat3());
+    Obstacle::around(corners, turn.transpose(), reach)
 }
 
 /// No coordinate of a path's points is larger.

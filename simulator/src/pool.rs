@@ -6,7 +6,7 @@
 
 use crate::{
     flux::{Deposit, VslFlux},
-    tracer::PathBatch,
+    tracer::{Path, PathBatch},
     trail::Vertex,
 };
 use glam::Vec3;
@@ -17,6 +17,8 @@ pub struct PathPool {
     slots: Vec<Slot>,
     deposits: Arena<Deposit>,
     vertices: Arena<Vertex>,
+    /// Barycentric coordinates, where the vertices are.
+    uvs: Vec<[f32; 2]>,
     /// The column of each run of slots, by the end of the run.
     columns: Vec<(u32, u32)>,
     /// Slots that hold a path, per column.
@@ -43,6 +45,7 @@ impl PathPool {
             slots: vec![Slot::default(); slots],
             deposits: Arena::default(),
             vertices: Arena::default(),
+            uvs: Vec::new(),
             columns,
             valid: vec![0; count],
             flux: VslFlux::new(vsls, count),
@@ -52,22 +55,47 @@ impl PathPool {
     /// Replaces the paths of the batch's slots: takes back what the old ones deposited and adds what the new ones did.
     pub fn replace(&mut self, batch: &PathBatch, birth_ms: u32) {
         for path in batch.paths() {
-            self.put(path.slot, path.deposits, path.vertices, birth_ms);
+            self.put(&path, birth_ms);
         }
     }
 
-    /// Puts a path into `slot`, in the place of the one that is there.
-    pub fn put(&mut self, slot: u32, deposits: &[Deposit], vertices: &[Vertex], birth_ms: u32) {
-        let column = self.column_of(slot);
-        self.take_back(slot, column);
-        self.slots[slot as usize] = Slot {
-            deposits: self.deposits.insert(deposits),
-            vertices: self.vertices.insert(vertices),
-            valid: true,
-            birth_ms,
-        };
+    /// Puts a path into its slot, in the place of the one that is there.
+    pub fn put(&mut self, path: &Path<'_>, birth_ms: u32) {
+        let column = self.column_of(path.slot);
+        self.take_back(path.slot, column);
+        let vertices = self.vertices.insert(path.vertices);
+        self.uvs.resize(self.vertices.storage.len(), [0.0; 2]);
+        self.uvs[vertices.range()].copy_from_slice(path.uvs);
+        let deposits = self.deposits.insert(path.deposits);
+        self.slots[path.slot as usize] = Slot { deposits, vertices, valid: true, birth_ms };
         self.valid[column as usize] += 1;
-        self.flux.add(column, deposits, birth_ms);
+        self.flux.add(column, path.deposits, birth_ms);
+    }
+
+    /// Empties the slots of `slots` after the first `kept` of them; all of these are a column of their own.
+    pub fn truncate(&mut self, slots: std::ops::Range<u32>, kept: u32) {
+        let column = self.column_of(slots.start);
+        if kept > slots.len() as u32 / 2 {
+            (slots.start + kept..slots.end).for_each(|slot| self.take_back(slot, column));
+            return;
+        }
+        // Adding up few is less work than taking back many.
+        self.flux.clear(column);
+        self.valid[column as usize] = 0;
+        for slot in slots.clone() {
+            let Slot { deposits, vertices, valid, birth_ms } = self.slots[slot as usize];
+            if !valid {
+                continue;
+            }
+            if slot < slots.start + kept {
+                self.flux.add(column, self.deposits.get(deposits), birth_ms);
+                self.valid[column as usize] += 1;
+            } else {
+                self.deposits.remove(deposits);
+                self.vertices.remove(vertices);
+                self.slots[slot as usize] = Slot::default();
+            }
+        }
     }
 
     /// Takes back everything that the path in `slot` deposited and leaves the slot empty.
@@ -132,6 +160,17 @@ impl PathPool {
         slot.valid.then(|| self.vertices.get(slot.vertices))
     }
 
+    /// The path in `slot`; `None` where there is none.
+    pub fn whole_path(&self, slot: u32) -> Option<Path<'_>> {
+        let Slot { deposits, vertices, valid, .. } = *self.slots.get(slot as usize)?;
+        valid.then(|| Path {
+            slot,
+            deposits: self.deposits.get(deposits),
+            vertices: self.vertices.get(vertices),
+            uvs: &self.uvs[vertices.range()],
+        })
+    }
+
     /// When the path in `slot` was traced, in ms since the simulation started; `None` where there is no path.
     pub fn birth_ms(&self, slot: u32) -> Option<u32> {
         let slot = self.slots.get(slot as usize)?;
@@ -149,7 +188,7 @@ impl PathPool {
 
     /// Bytes the pool takes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.slots) + self.deposits.bytes() + self.vertices.bytes()
+        size_of_val(&*self.slots) + self.deposits.bytes() + self.vertices.bytes() + size_of_val(&*self.uvs)
     }
 }
 
@@ -158,6 +197,12 @@ impl PathPool {
 struct Block {
     start: u32,
     length: u16,
+}
+
+impl Block {
+    fn range(self) -> std::ops::Range<usize> {
+        self.start as usize..self.start as usize + usize::from(self.length)
+    }
 }
 
 /// Runs of items in blocks of a power of two, each size with a list of free blocks: replacing never moves others.
@@ -189,11 +234,11 @@ impl<T: Copy + Default> Arena<T> {
     }
 
     fn get(&self, block: Block) -> &[T] {
-        &self.storage[block.start as usize..][..usize::from(block.length)]
+        &self.storage[block.range()]
     }
 
     fn get_mut(&mut self, block: Block) -> &mut [T] {
-        &mut self.storage[block.start as usize..][..usize::from(block.length)]
+        &mut self.storage[block.range()]
     }
 
     /// The block size for `length` items, as a power of two.

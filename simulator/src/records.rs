@@ -2,7 +2,7 @@
 
 use crate::{counters::Counters, flux::FluxReading, placement::Placement};
 use photonstream_protocol::{LightRecord, ObjectRecord, VslRecord};
-use photonstream_scene::Scene;
+use photonstream_scene::{ObjectId, Scene};
 use photonstream_shading::LightShape;
 
 /// One record for each virtual surface light: where it is, without its flux.
@@ -42,13 +42,14 @@ pub fn relative_error(records: &[VslRecord]) -> f64 {
     if flux > 0.0 { errors / flux } else { 0.0 }
 }
 
-/// One record for each object: its motion from rest space to the scene's space.
+/// One record for each object: the map from its rest space as loaded to the scene's space, and what it reflects.
 pub fn object_records(scene: &Scene) -> Vec<ObjectRecord> {
     (0u32..)
-        .zip(&scene.objects)
-        .map(|(id, object)| ObjectRecord {
+        .take(scene.objects.len())
+        .map(|id| ObjectRecord {
             id,
-            world_from_object: object.world_from_rest.to_cols_array(),
+            world_from_object: scene.world_from_loaded(ObjectId(id)).to_cols_array(),
+            albedo: scene.albedo(ObjectId(id)).to_array(),
             ..ObjectRecord::default()
         })
         .collect()

@@ -67,6 +67,8 @@ pub struct PathBatch {
     pub point_counts: Vec<u16>,
     /// The points of all paths, one after another.
     pub vertices: Vec<Vertex>,
+    /// Barycentric coordinates of each point that is a hit.
+    pub uvs: Vec<[f32; 2]>,
     /// What happened on the way.
     pub counters: Counters,
 }
@@ -79,17 +81,19 @@ impl PathBatch {
         self.deposits.clear();
         self.point_counts.clear();
         self.vertices.clear();
+        self.uvs.clear();
         self.counters = Counters::default();
     }
 
     /// Each path.
     pub fn paths(&self) -> impl Iterator<Item = Path<'_>> {
-        let (mut deposits, mut vertices) = (self.deposits.as_slice(), self.vertices.as_slice());
+        let (mut deposits, mut vertices, mut uvs) = (&self.deposits[..], &self.vertices[..], &self.uvs[..]);
         self.slots.iter().zip(&self.lengths).zip(&self.point_counts).map(
             move |((&slot, &length), &points)| Path {
                 slot,
                 deposits: take(&mut deposits, length),
                 vertices: take(&mut vertices, points),
+                uvs: take(&mut uvs, points),
             },
         )
     }
@@ -110,6 +114,8 @@ pub struct Path<'a> {
     pub deposits: &'a [Deposit],
     /// The points it passed; none where its light sent nothing.
     pub vertices: &'a [Vertex],
+    /// Barycentric coordinates of each point that is a hit.
+    pub uvs: &'a [[f32; 2]],
 }
 
 /// Sees what a tracer does; `()` sees nothing and costs nothing.
@@ -207,7 +213,7 @@ impl Tracer {
                 let ray =
                     Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
                 wave.photons.push(Photon { path, throughput, ray });
-                wave.points.push((path, Vertex::emitted(ray.origin)));
+                wave.points.push((path, Vertex::emitted(ray.origin), [0.0; 2]));
                 wave.samples.push(samples.get(i));
             }
         }
@@ -263,7 +269,7 @@ impl Tracer {
         photon: &Photon,
         hit: &Option<Hit>,
         roulette: f32,
-        (events, points): (&mut Vec<(u32, Deposit)>, &mut Vec<(u32, Vertex)>),
+        (events, points): (&mut Vec<(u32, Deposit)>, &mut Vec<Point>),
         counters: &mut Counters,
         watcher: &mut impl Watcher,
     ) -> Option<(Photon, Vec3)> {
@@ -271,7 +277,7 @@ impl Tracer {
             // A ray that is not finite hits nothing. One sum instead of nine tests: it is finite unless a part is not.
             if (photon.ray.origin + photon.ray.direction + photon.throughput).is_finite() {
                 counters.escaped += 1;
-                points.push((photon.path, Vertex::escaped(photon.ray.direction)));
+                points.push((photon.path, Vertex::escaped(photon.ray.direction), [0.0; 2]));
             } else {
                 counters.rejected += 1;
             }
@@ -282,7 +288,7 @@ impl Tracer {
         let vertices = self.geometry.triangle(hit.triangle);
         let point = surface::point(vertices, hit.u, hit.v);
         let mut arrive = |deposited| {
-            points.push((photon.path, Vertex::hit(point, [hit.u, hit.v], hit.triangle, side, deposited)));
+            points.push((photon.path, Vertex::hit(point, hit.triangle, side, deposited), [hit.u, hit.v]));
         };
         let reflection = self.surfaces[self.geometry.object_of[hit.triangle as usize].0 as usize];
         if !reflection.sides.contains(side) {
@@ -318,6 +324,9 @@ impl Tracer {
     }
 }
 
+/// A path, a point that it passed, and its barycentric coordinates.
+type Point = (u32, Vertex, [f32; 2]);
+
 /// A photon on its way.
 #[derive(Clone, Copy, Debug)]
 struct Photon {
@@ -342,7 +351,7 @@ pub struct Wave {
     /// Deposits of all paths as they happened.
     events: Vec<(u32, Deposit)>,
     /// Points of all paths as they were passed.
-    points: Vec<(u32, Vertex)>,
+    points: Vec<Point>,
     /// Where each path's deposits go next.
     places: Vec<u32>,
 }
@@ -350,35 +359,45 @@ pub struct Wave {
 impl Wave {
     /// Sorts deposits and points by path, each path's in their order, into the batch.
     fn collect(&mut self, count: usize, batch: &mut PathBatch) {
-        sort_by_path(count, &self.events, &mut self.places, &mut batch.lengths, &mut batch.deposits);
-        sort_by_path(count, &self.points, &mut self.places, &mut batch.point_counts, &mut batch.vertices);
+        let paths = self.events.iter().map(|event| event.0);
+        count_by_path(count, paths, &mut self.places, &mut batch.lengths);
+        batch.deposits.resize(self.events.len(), Deposit::default());
+        for &(path, deposit) in &self.events {
+            batch.deposits[next_place(&mut self.places, path)] = deposit;
+        }
+        let paths = self.points.iter().map(|point| point.0);
+        count_by_path(count, paths, &mut self.places, &mut batch.point_counts);
+        batch.vertices.resize(self.points.len(), Vertex::default());
+        batch.uvs.resize(self.points.len(), [0.0; 2]);
+        for &(path, vertex, uv) in &self.points {
+            let place = next_place(&mut self.places, path);
+            (batch.vertices[place], batch.uvs[place]) = (vertex, uv);
+        }
         batch.counters.deposits += self.events.len() as u64;
     }
 }
 
-/// Sorts `found` by path into `sorted`, and counts how many each path has.
-fn sort_by_path<T: Copy + Default>(
+/// Counts how often each path is named, and where the first of each belongs when all are sorted by path.
+fn count_by_path(
     paths: usize,
-    found: &[(u32, T)],
+    named: impl Iterator<Item = u32>,
     places: &mut Vec<u32>,
     counts: &mut Vec<u16>,
-    sorted: &mut Vec<T>,
 ) {
     counts.clear();
     counts.resize(paths, 0);
-    for &(path, _) in found {
-        counts[path as usize] += 1;
-    }
+    named.for_each(|path| counts[path as usize] += 1);
     places.clear();
     places.extend(counts.iter().scan(0, |end, &count| {
         let start = *end;
         *end += u32::from(count);
         Some(start)
     }));
-    sorted.resize(found.len(), T::default());
-    for &(path, item) in found {
-        let place = &mut places[path as usize];
-        sorted[*place as usize] = item;
-        *place += 1;
-    }
+}
+
+#[inline]
+fn next_place(places: &mut [u32], path: u32) -> usize {
+    let place = &mut places[path as usize];
+    *place += 1;
+    *place as usize - 1
 }

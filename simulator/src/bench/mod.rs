@@ -3,10 +3,12 @@
 //! The machine may be busy with other things, so that figures taken minutes apart cannot be compared. Each figure is
 //! the best of several rounds, rounds of all parts take turns, and what matters are their ratios.
 
+mod dynamic;
 mod exchange;
 mod parts;
 mod report;
 
+pub use dynamic::{CurvePoint, DynamicOptions, DynamicReport, EventFigures, run as run_dynamic};
 pub use exchange::Exchange;
 pub use parts::Parts;
 pub use report::{BenchReport, Throughput};

@@ -10,6 +10,7 @@ use crate::{
     change::{LightRevision, obstacle, reach_of, reflects_alike},
     flux::Deposit,
     simulation::Simulation,
+    tracer::Path,
     trail::{Disturbance, Event, Vertex},
 };
 use glam::Vec3;
@@ -163,15 +164,12 @@ impl Ledger {
                 (old_light.slots.start..old_light.slots.start + self.active[*old_index]).zip(new_slots)
             {
                 let mark = self.slots[old_slot as usize];
-                let (Some(deposits), Some(vertices)) = (self.pool.path(old_slot), self.pool.trail(old_slot))
-                else {
-                    continue;
-                };
+                let Some(path) = self.pool.whole_path(old_slot) else { continue };
                 let is_stale =
-                    mark & STALE != 0 || revision.stale || migration.disturbance.concerns(vertices);
-                moved.take(migration, simulation, deposits, vertices, revision.factor);
+                    mark & STALE != 0 || revision.stale || migration.disturbance.concerns(path.vertices);
+                moved.take(migration, simulation, &path, revision.factor);
                 let birth_ms = self.pool.birth_ms(old_slot).unwrap_or_default();
-                next.pool.put(slot, &moved.deposits, &moved.vertices, birth_ms);
+                next.pool.put(&moved.path(slot), birth_ms);
                 next.slots[slot as usize] = FILLED | if is_stale { STALE } else { 0 };
                 debug_assert!(next.slots[slot as usize] & UNDER_WAY == 0);
                 next.empty -= 1;
@@ -196,23 +194,27 @@ impl Ledger {
 struct Moved {
     deposits: Vec<Deposit>,
     vertices: Vec<Vertex>,
+    uvs: Vec<[f32; 2]>,
 }
 
 impl Moved {
-    fn take(
-        &mut self,
-        migration: &Migration,
-        simulation: &Simulation,
-        deposits: &[Deposit],
-        vertices: &[Vertex],
-        factor: Vec3,
-    ) {
+    fn path(&self, slot: u32) -> Path<'_> {
+        Path { slot, deposits: &self.deposits, vertices: &self.vertices, uvs: &self.uvs }
+    }
+
+    fn push(&mut self, vertex: Vertex, uv: [f32; 2]) {
+        self.vertices.push(vertex);
+        self.uvs.push(uv);
+    }
+
+    fn take(&mut self, migration: &Migration, simulation: &Simulation, path: &Path<'_>, factor: Vec3) {
         self.deposits.clear();
         self.vertices.clear();
-        let mut rest = deposits.iter();
-        for vertex in vertices {
+        self.uvs.clear();
+        let mut rest = path.deposits.iter();
+        for (vertex, &uv) in path.vertices.iter().zip(path.uvs) {
             let Event::Hit { triangle, side, deposited } = vertex.event() else {
-                self.vertices.push(*vertex);
+                self.push(*vertex, uv);
                 continue;
             };
             let deposit = if deposited { rest.next() } else { None };
@@ -222,21 +224,20 @@ impl Moved {
                 continue;
             }
             let Some(deposit) = deposit else {
-                self.vertices.push(vertex.renumbered(number));
+                self.push(vertex.renumbered(number), uv);
                 continue;
             };
-            let [u, v] = vertex.uv;
             let owner = if migration.same_owners {
                 deposit.vsl
             } else {
-                match simulation.owners.owner(number, side, u, v) {
+                match simulation.owners.owner(number, side, uv[0], uv[1]) {
                     Some(owner) => owner.0,
                     None => continue,
                 }
             };
             let deposit = Deposit { vsl: owner, ..*deposit };
             self.deposits.push(if factor == Vec3::ONE { deposit } else { deposit.scaled(factor) });
-            self.vertices.push(vertex.renumbered(number));
+            self.push(vertex.renumbered(number), uv);
         }
     }
 }

@@ -61,6 +61,19 @@ pub struct Savings {
     pub retraced_paths: u64,
 }
 
+/// Paths of a light from which it is guessed how many of all are concerned.
+const LOOKED_AT: u32 = 1024;
+
+/// Paths in one unit of parallel work when all are looked through.
+const PATHS_LOOKED_AT: usize = 8192;
+
+/// What a look through the pool has found.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    stale: u32,
+    kept_rays: u64,
+}
+
 const FILLED: u8 = 1;
 const STALE: u8 = 2;
 const UNDER_WAY: u8 = 4;
@@ -162,80 +175,102 @@ impl Ledger {
             }
         }
         if needs_rays {
+            if let Some(budget) = budget {
+                self.fit(budget, &change, |ledger| ledger.estimate(&change));
+            }
             self.make_stale(&change);
         }
-        let change = Arc::new(change);
-        if !self.under_way.is_empty() {
-            self.changes.push_back((self.version, change));
-        }
         if let Some(budget) = budget {
-            self.fit(budget);
+            self.fit(budget, &change, |ledger| f64::from(ledger.empty + ledger.stale_paths));
+        }
+        if !self.under_way.is_empty() {
+            self.changes.push_back((self.version, Arc::new(change)));
         }
         self.queue_open_slots();
+    }
+
+    /// About how many paths would have to be traced after `change`, from the first of each light.
+    fn estimate(&self, change: &Change) -> f64 {
+        let mut open = 0.0;
+        for (index, light) in self.emitters.lights.iter().enumerate() {
+            let count = self.active[index].min(LOOKED_AT);
+            let slots = light.slots.start..light.slots.start + count;
+            let is_open = |slot: &u32| {
+                self.slots[*slot as usize] & (FILLED | STALE) != FILLED
+                    || change.concerns(index, self.pool.trail(*slot).unwrap_or_default())
+            };
+            let share = slots.filter(is_open).count() as f64 / f64::from(count.max(1));
+            open += share * f64::from(self.active[index]);
+        }
+        open
     }
 
     /// Marks the paths that `change` concerns.
     fn make_stale(&mut self, change: &Change) {
         for (index, light) in self.emitters.lights.iter().enumerate() {
-            let slots = light.slots.start..light.slots.start + self.active[index];
-            let (pool, marks) = (&self.pool, &self.slots);
-            let is_valid = |slot: &u32| marks[*slot as usize] & (FILLED | STALE) == FILLED;
-            let concerned: Vec<u32> = if change.lights[index].stale {
-                slots.clone().filter(is_valid).collect()
-            } else if change.may_concern(index) {
-                slots
-                    .clone()
-                    .into_par_iter()
-                    .with_min_len(8192)
-                    .filter(|slot| {
-                        is_valid(slot) && change.concerns(index, pool.trail(*slot).unwrap_or_default())
-                    })
-                    .collect()
-            } else {
-                Vec::new()
+            let first = light.slots.start as usize;
+            let (pool, count) = (&self.pool, self.active[index] as usize);
+            let may_concern = change.may_concern(index);
+            let look = |(marks, start): (&mut [u8], usize)| {
+                let mut found = Found::default();
+                for (mark, slot) in marks.iter_mut().zip(start as u32..) {
+                    if *mark & (FILLED | STALE) != FILLED {
+                        continue;
+                    }
+                    let trail = pool.trail(slot).unwrap_or_default();
+                    if may_concern && change.concerns(index, trail) {
+                        *mark |= STALE;
+                        found.stale += 1;
+                    } else {
+                        found.kept_rays += trail.len().saturating_sub(1) as u64;
+                    }
+                }
+                found
             };
-            for &slot in &concerned {
-                self.slots[slot as usize] |= STALE;
-            }
-            self.stale_paths += concerned.len() as u32;
-            self.savings.retraced_paths += concerned.len() as u64;
-            let (pool, marks) = (&self.pool, &self.slots);
-            let kept = slots.filter(|&slot| marks[slot as usize] & (FILLED | STALE) == FILLED);
-            self.savings.rays_saved += kept.map(|slot| rays(pool, slot)).sum::<u64>();
+            let parts = self.slots[first..first + count].par_chunks_mut(PATHS_LOOKED_AT).enumerate();
+            let found = parts.map(|(part, marks)| look((marks, first + part * PATHS_LOOKED_AT))).reduce(
+                Found::default,
+                |a, b| Found { stale: a.stale + b.stale, kept_rays: a.kept_rays + b.kept_rays },
+            );
+            self.stale_paths += found.stale;
+            self.savings.retraced_paths += u64::from(found.stale);
+            self.savings.rays_saved += found.kept_rays;
         }
     }
 
-    /// Takes slots out of use until no more than `budget` of them have to be traced.
-    fn fit(&mut self, budget: u32) {
-        // The first slots of a light may have more than their share of stale paths.
+    /// Takes slots out of use until no more than `budget` of those that `count` says have to be traced.
+    fn fit(&mut self, budget: u32, change: &Change, count: impl Fn(&Self) -> f64) {
+        // The first slots of a light may have more than their share of them.
         let mut before = u32::MAX;
-        while self.empty + self.stale_paths > budget && self.active_slots() < before {
+        while self.active_slots() < before {
+            let open = count(self);
+            if open <= f64::from(budget) {
+                return;
+            }
             before = self.active_slots();
-            self.shrink(budget);
+            self.shrink(f64::from(budget) / open, change);
         }
     }
 
-    fn shrink(&mut self, budget: u32) {
-        let open = self.empty + self.stale_paths;
-        let share = f64::from(budget) / f64::from(open);
+    /// Leaves a share of the slots of each light in use that `change` may concern.
+    fn shrink(&mut self, share: f64, change: &Change) {
         for index in 0..self.active.len() {
             let light = &self.emitters.lights[index];
             let column = &self.emitters.columns[light.column as usize];
-            let slots = light.slots.start..light.slots.start + self.active[index];
-            let is_open = |slot: u32| self.slots[slot as usize] & (FILLED | STALE) != FILLED;
             // In a shared column a path's weight is that of its light's share of the slots.
-            if column.shared_watts.is_some() || !slots.clone().any(is_open) {
+            if column.shared_watts.is_some() || !change.may_concern(index) {
                 continue;
             }
+            let slots = light.slots.start..light.slots.start + self.active[index];
             let fewer = (f64::from(self.active[index]) * share) as u32;
             let fewer = fewer.max(LEAST_ACTIVE).min(self.active[index]);
-            for slot in light.slots.start + fewer..slots.end {
-                let mark = self.slots[slot as usize];
-                self.empty -= u32::from(mark & FILLED == 0);
-                self.stale_paths -= u32::from(mark & STALE != 0);
-                self.pool.remove(slot);
-                self.slots[slot as usize] = mark & UNDER_WAY;
+            for mark in &mut self.slots[(slots.start + fewer) as usize..slots.end as usize] {
+                self.empty -= u32::from(*mark & FILLED == 0);
+                self.stale_paths -= u32::from(*mark & STALE != 0);
+                *mark &= UNDER_WAY;
             }
+            self.refinement.reset(light.column as usize, self.version);
+            self.pool.truncate(slots, fewer);
             self.active[index] = fewer;
         }
     }
@@ -410,7 +445,7 @@ impl Ledger {
             self.empty -= u32::from(mark & FILLED == 0);
             self.stale_paths -= u32::from(mark & STALE != 0);
             self.stale_paths += u32::from(is_stale);
-            self.pool.put(path.slot, path.deposits, path.vertices, birth_ms);
+            self.pool.put(&path, birth_ms);
             self.slots[path.slot as usize] = FILLED | if is_stale { STALE } else { 0 };
             if is_stale {
                 self.savings.retraced_paths += 1;

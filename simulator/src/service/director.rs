@@ -174,6 +174,7 @@ impl Director {
             snapshots: snapshot_sender,
             emptied,
             after_paths: options.after_paths,
+            only_whole: scene.streaming.fixed_step_ms.is_some() && !scene.animation.is_empty(),
             settled: settled_sender,
         };
         let ledger = {

@@ -116,6 +116,8 @@ pub(super) struct LedgerActor {
     pub(super) emptied: Arc<ArrayQueue<PlacedRecords>>,
     /// Stop handing out work after this many paths.
     pub(super) after_paths: Option<u64>,
+    /// Publish the first version only once its light is whole, as [`Version::only_whole`].
+    pub(super) only_whole: bool,
     /// Told whenever a frame of the whole light of a version was published.
     pub(super) settled: flume::Sender<u64>,
 }
@@ -138,6 +140,10 @@ struct Progress {
     /// When the oldest change came whose light is not traced yet, monotonic ns.
     waiting_since_ns: Option<u64>,
     latency_ms: f64,
+    /// Paths traced before that change.
+    paths_before_change: u64,
+    /// Paths that a change had traced in a ms, with all that it takes beside.
+    paths_per_ms: Option<f64>,
     /// Of the frame published last.
     relative_error: f64,
     /// How long the last frame took to be made.
@@ -170,11 +176,13 @@ impl LedgerActor {
             places: 0,
             placements: 0,
             time_s: 0.0,
-            only_whole: false,
+            only_whole: self.only_whole,
             versions: 0,
             unsettled: true,
             waiting_since_ns: None,
             latency_ms: 0.0,
+            paths_before_change: 0,
+            paths_per_ms: None,
             relative_error: 0.0,
             publishing: Duration::ZERO,
             spare: Vec::new(),
@@ -414,7 +422,10 @@ impl Progress {
         self.edit_received_ns = received_ns;
         // An edit that needs no ray is traced with its arrival.
         self.traced_ns = monotonic_ns();
-        self.waiting_since_ns.get_or_insert(received_ns);
+        if self.waiting_since_ns.is_none() {
+            self.waiting_since_ns = Some(received_ns);
+            self.paths_before_change = self.ledger.counters().paths;
+        }
         self.note_whole_light();
         self.changed = true;
     }
@@ -422,23 +433,32 @@ impl Progress {
     /// The number of paths that can be traced in the time that a change may take; `None` where it may take any.
     fn budget(&self, simulation: &Simulation) -> Option<u32> {
         let latency_ms = simulation.scene.streaming.latency_ms;
-        let seconds = self.active_time(Instant::now()).as_secs_f64();
-        let paths = self.ledger.counters().paths;
-        // A rate of less than that says little.
-        if latency_ms <= 0.0 || paths < 4096 || seconds <= 0.0 {
+        if latency_ms <= 0.0 {
             return None;
         }
+        let paths_per_ms = self.paths_per_ms.or_else(|| {
+            let ms = self.active_time(Instant::now()).as_secs_f64() * 1e3;
+            let paths = self.ledger.counters().paths;
+            // A rate of less than that says little.
+            (paths >= 4096 && ms > 0.0).then(|| paths as f64 / ms)
+        })?;
         // The frame that shows it has to be made, too.
-        let time = (latency_ms / 1e3 - self.publishing.as_secs_f64()).max(0.1 * latency_ms / 1e3);
-        Some((paths as f64 / seconds * time).min(f64::from(u32::MAX)) as u32)
+        let time = (latency_ms - self.publishing.as_secs_f64() * 1e3).max(0.1 * latency_ms);
+        Some((paths_per_ms * time).min(f64::from(u32::MAX)) as u32)
     }
 
-    /// Notes how long a change has taken, once its light is traced.
+    /// Notes how long a change has taken, once its light is traced, and how many paths a change can take in a time.
     fn note_whole_light(&mut self) {
         if self.ledger.is_settled()
             && let Some(since) = self.waiting_since_ns.take()
         {
             self.latency_ms = self.traced_ns.saturating_sub(since) as f64 * 1e-6;
+            let paths = self.ledger.counters().paths.saturating_sub(self.paths_before_change);
+            // Fewer are over before the threads have begun.
+            if paths >= 1024 && self.latency_ms > 0.0 {
+                let now = paths as f64 / self.latency_ms;
+                self.paths_per_ms = Some(self.paths_per_ms.map_or(now, |before| 0.5 * (before + now)));
+            }
         }
     }
 

@@ -151,12 +151,12 @@ fn what_a_change_does_not_concern_is_not_traced_again() {
         (stale, ledger.savings())
     };
     let (stale, savings) = stale_after(&|room| room.ball[0] += 0.3);
-    assert!(stale > slots / 10 && stale < slots * 3 / 4, "{stale} of {slots}");
+    assert!(stale > slots / 20 && stale < slots / 2, "{stale} of {slots}");
     assert!(savings.retraced_paths == u64::from(stale) && savings.rays_saved > u64::from(slots - stale));
     let (recoloured, _) = stale_after(&|room| room.albedo = 0.2);
     assert!(
-        recoloured > slots / 20 && recoloured < stale,
-        "{recoloured} touched ball or crate, {stale} came near"
+        recoloured > slots / 20 && recoloured < slots / 2,
+        "{recoloured} touched ball or crate"
     );
     assert_eq!(stale_after(&|room| room.vsls = 57).0, 0);
     assert_eq!(stale_after(&|room| room.power = 9.0).0, 0);
