@@ -11,7 +11,7 @@ use photonstream_shading::Kernel;
 ///
 /// A pixel's centre within 1/256 pixel of an edge (the rasteriser's grid) may fall on either side; this camera looks
 /// at the room so that the edges of its walls run through the centres of pixels on the diagonals.
-fn same_surface(normals: [&[Vec3]; 2], albedos: [&[Vec3]; 2]) -> Vec<bool> {
+pub(crate) fn same_surface(normals: [&[Vec3]; 2], albedos: [&[Vec3]; 2]) -> Vec<bool> {
     let same = |[a, b]: [&[Vec3]; 2], i: usize| (a[i] - b[i]).abs().max_element() < 1e-3;
     (0..normals[0].len()).map(|i| same(normals, i) && same(albedos, i)).collect()
 }

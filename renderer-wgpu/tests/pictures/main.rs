@@ -4,6 +4,7 @@
 mod accumulations;
 mod against_cpu;
 mod approximations;
+mod edited;
 mod extremes;
 mod only_what_changed;
 mod scenes;
