@@ -1,6 +1,6 @@
 //! A running scene is edited over the control socket: every process shows the edited scene, as if it had been loaded.
 
-use crate::harness::{Ground, config, wait_for};
+use crate::harness::{Ground, config, files, wait_for};
 use photonstream_film::Film;
 use photonstream_protocol::{
     AccessMode, ControlClient, Reading, Reply, Request, Runtime, Subscriber, VslFrame,
@@ -117,6 +117,46 @@ fn an_edited_scene_is_the_scene_of_the_edited_config() {
         simulation.signal(rustix::process::Signal::TERM);
         simulation.wait().expect(0, &[]);
     }
+}
+
+/// A floor that loses its red and its blue while the CPU renderer takes picture after picture: those before the edit have
+/// all three, those from the promised frame on have green alone. Exact: a reflectance of 0 leaves nothing.
+#[test]
+fn pictures_follow_a_material() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let line = "--renderer cpu --headless --frames 100000 --sampling fresh --vsls 20 --pool 512 --size 24x24 \
+                --visibility none --channel painted --out film";
+    let arguments: Vec<_> = ["run", &scene].into_iter().chain(line.split_whitespace()).collect();
+    let run = ground.start(&arguments);
+    let painted = Channel { ground: &ground, name: "painted" };
+    // A picture's PNG is written after its EXR.
+    let pictures = || files(&ground.path("film"), "png");
+    let picture = |number: usize| {
+        let film = Film::read_exr(&ground.path(format!("film/frame-{number:04}.exr"))).unwrap();
+        // The floor before the sphere, one row above the picture's lower edge.
+        (film.metadata.frame.unwrap(), film.layer("full").unwrap().pixels[22 * 24 + 12])
+    };
+    let mut client = painted.connect();
+    wait_for("two pictures", || (pictures() >= 2).then_some(()));
+    for number in 1..=2 {
+        let (_, floor) = picture(number);
+        assert!(floor.min_element() > 0.0, "picture {number}: {floor}");
+    }
+    let request = json!({ "type": "set_material", "name": "white", "values": { "albedo": [0, 0.75, 0] } });
+    let Reply::Ok { frame: promised } = edit(&mut client, &request) else { panic!("{request}") };
+    let last = wait_for("three pictures after the edit", || {
+        let count = pictures();
+        (count >= 3 && picture(count - 2).0 >= promised).then_some(count)
+    });
+    for number in last - 2..=last {
+        let (frame, floor) = picture(number);
+        assert!(frame >= promised && floor.y > 0.0, "picture {number}: {floor}");
+        assert_eq!((floor.x, floor.z), (0.0, 0.0), "picture {number}");
+    }
+    run.signal(rustix::process::Signal::TERM);
+    run.wait().expect(130, &[]);
+    ground.wait_for_silence();
 }
 
 #[test]
