@@ -189,3 +189,23 @@ fn degenerate_triangles_are_harmless() {
     assert!(film.layer("direct").unwrap().pixels.iter().any(|p| p.x > 0.1));
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+/// The picture of the door room with its door closed, by shadow rays, is black to the last bit, and bright when the door is
+/// open. 48 × 48 pixels, 300 VSLs, 2¹⁵ paths.
+#[test]
+fn a_closed_room_is_black() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/door-room.toml");
+    let mut config = SceneConfig::from_file(&path).unwrap();
+    (config.streaming.vsls, config.streaming.pool_paths) = (Some(300), Some(1 << 15));
+    let brightness = |time: f64| {
+        let scene = Arc::new(config.at(time).unwrap().build().unwrap());
+        let (vsls, _) = stream(&scene);
+        let film = picture(&scene, &vsls, 48, Kernel::Disc, Visibility::Rays).film;
+        let sum =
+            |layer: &str| film.layer(layer).unwrap().pixels.iter().map(|p| p.element_sum()).sum::<f32>();
+        [sum("direct"), sum("indirect")]
+    };
+    assert_eq!(brightness(0.0), [0.0, 0.0]);
+    let [open, wide] = [2.5, 5.0].map(brightness);
+    assert!(open[0] > 0.0 && open[1] > 0.0 && wide[0] > open[0] && wide[1] > open[1], "{open:?} {wide:?}");
+}

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod default_run;
+mod dynamic;
 mod edits;
 mod ending;
 mod giving_up;
