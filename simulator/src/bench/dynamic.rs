@@ -261,15 +261,18 @@ fn check_over_trace(simulation: &Simulation) -> f64 {
     let moved = simulation.with_scene(Arc::new(edit.finish()));
     let change = Change::between(simulation, &moved);
     let ledger: Ledger = simulation.fill();
+    // Paths are traced on one thread, too.
+    let Ok(alone) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return 0.0 };
     let (mut check, mut trace) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..5 {
         let begun = Instant::now();
-        let mut concerned = 0;
-        for light in &simulation.emitters.lights {
-            let paths = light.slots.clone().filter_map(|slot| ledger.pool().trail(slot));
-            concerned += paths.filter(|trail| change.concerns(light.light.0 as usize, trail)).count();
-        }
-        std::hint::black_box(concerned);
+        let count = || {
+            let concerned = change.look_through(ledger.pool());
+            let lights = simulation.emitters.lights.iter();
+            let slots = lights.flat_map(|l| l.slots.clone().map(|slot| (l.light.0 as usize, slot)));
+            slots.filter(|&(light, slot)| concerned.contains(light, slot)).count()
+        };
+        std::hint::black_box(alone.install(count));
         check = check.min(begun.elapsed().as_secs_f64());
         let (mut again, mut wave, mut batch) = (simulation.ledger(), Wave::default(), PathBatch::default());
         let begun = Instant::now();
@@ -320,23 +323,32 @@ impl Follower {
 
     /// Figures of changes to and fro, and the errors of the first whole frame and of the converged one.
     fn follow(
-        mut self,
+        self,
         event: &str,
         requests: &[Request; 2],
         rounds: usize,
         pool_rays: u64,
     ) -> Result<(EventFigures, [f64; 2]), SimulatorError> {
-        let mut before = self.frames_until(|frame| frame.statistics.converged == 1)?.pop();
+        let Self { service, stop, channel, mut subscriber, mut client } = self;
+        let mut before = frames_until(&mut subscriber, |frame| frame.statistics.converged == 1)?.pop();
         let mut all: Vec<[f64; 7]> = Vec::new();
         for round in 0..rounds {
-            let reply = self.client.request(&requests[round % 2], PATIENCE)?;
-            let Reply::Ok { frame: number } = reply else {
-                let message = format!("{event}: {reply:?}");
+            let arrived = before.as_ref().map_or(0, |frame| frame.statistics.edit_received_ns);
+            let is_new = |frame: &VslFrame| frame.statistics.edit_received_ns > arrived;
+            // Frames are looked for while the request is still under way: the first may come before the reply.
+            let (frames, reply) = std::thread::scope(|scope| {
+                let looking = scope.spawn(|| {
+                    frames_until(&mut subscriber, |frame| is_new(frame) && frame.statistics.converged == 1)
+                });
+                let reply = client.request(&requests[round % 2], PATIENCE);
+                (looking.join(), reply)
+            });
+            let Reply::Ok { .. } = reply? else {
+                let message = format!("{event} was refused");
                 return Err(ProtocolError::Control { message }.into());
             };
-            let frames =
-                self.frames_until(|frame| frame.frame >= number && frame.statistics.converged == 1)?;
-            let frames: Vec<VslFrame> = frames.into_iter().filter(|frame| frame.frame >= number).collect();
+            let frames = frames.map_err(|_| SimulatorError::ActorStopped { actor: "reader" })??;
+            let frames: Vec<VslFrame> = frames.into_iter().filter(is_new).collect();
             if let (Some(old), Some(figures)) = (&before, figures(before.as_ref(), &frames)) {
                 let last = &frames[frames.len() - 1];
                 let traced = last.statistics.rays_total - old.statistics.rays_total;
@@ -347,13 +359,13 @@ impl Follower {
             before = frames.into_iter().last();
         }
         // It may have ended by itself, and says why.
-        let _ = self.stop.send(());
-        drop(self.subscriber);
-        match self.service.join() {
+        let _ = stop.send(());
+        drop(subscriber);
+        match service.join() {
             Ok(summary) => drop(summary?),
             Err(_) => return Err(SimulatorError::ActorStopped { actor: "service" }),
         }
-        photonstream_protocol::clean_one(&self.channel)?;
+        photonstream_protocol::clean_one(&channel)?;
         let median = |index: usize| {
             let mut of_all: Vec<f64> = all.iter().map(|round| round[index]).collect();
             of_all.sort_by(f64::total_cmp);
@@ -369,30 +381,33 @@ impl Follower {
         };
         Ok((figures, [median(5), median(6)]))
     }
+}
 
-    /// All frames that were seen until one is `wanted`.
-    fn frames_until(&mut self, wanted: impl Fn(&VslFrame) -> bool) -> Result<Vec<VslFrame>, SimulatorError> {
-        let deadline = Instant::now() + PATIENCE;
-        let mut frames = Vec::new();
-        loop {
-            let is_new = self.subscriber.read()? == Reading::New;
-            if let Some(frame) = self.subscriber.frame().filter(|_| is_new) {
-                frames.push(frame.clone());
-            }
-            if frames.last().is_some_and(&wanted) {
-                return Ok(frames);
-            }
-            // What was wanted may have been read before.
-            if let Some(frame) = self.subscriber.frame().filter(|frame| wanted(frame)) {
-                frames.push(frame.clone());
-                return Ok(frames);
-            }
-            if Instant::now() > deadline {
-                let message = format!("no converged light within {} s", PATIENCE.as_secs());
-                return Err(ProtocolError::Control { message }.into());
-            }
-            self.subscriber.wait(Duration::from_millis(20));
+/// All frames that were seen until one is `wanted`.
+fn frames_until(
+    subscriber: &mut Subscriber,
+    wanted: impl Fn(&VslFrame) -> bool,
+) -> Result<Vec<VslFrame>, SimulatorError> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut frames = Vec::new();
+    loop {
+        let is_new = subscriber.read()? == Reading::New;
+        if let Some(frame) = subscriber.frame().filter(|_| is_new) {
+            frames.push(frame.clone());
         }
+        if frames.last().is_some_and(&wanted) {
+            return Ok(frames);
+        }
+        // What was wanted may have been read before.
+        if let Some(frame) = subscriber.frame().filter(|frame| wanted(frame)) {
+            frames.push(frame.clone());
+            return Ok(frames);
+        }
+        if Instant::now() > deadline {
+            let message = format!("no converged light within {} s", PATIENCE.as_secs());
+            return Err(ProtocolError::Control { message }.into());
+        }
+        subscriber.wait(Duration::from_millis(20));
     }
 }
 
