@@ -1,8 +1,11 @@
 //! Turns two versions of a scene into what the step from one to the other means for the paths of each light.
 
 use crate::{
+    disturbance::{Disturbance, Obstacle},
+    encounters::Encounters,
+    pool::PathPool,
     simulation::Simulation,
-    trail::{Disturbance, Obstacle, Vertex},
+    trail::Vertex,
 };
 use glam::{Mat3A, Vec3};
 use photonstream_scene::{Object, Scene, Side};
@@ -48,9 +51,41 @@ impl Change {
         self.lights[light].stale || self.disturbance.concerns(vertices)
     }
 
+    /// Looks through all paths of `pool` at once, on the present rayon pool.
+    pub fn look_through<'a>(&'a self, pool: &'a PathPool) -> Concerned<'a> {
+        let is_needed = !self.disturbance.is_empty() && self.lights.iter().any(|light| !light.stale);
+        let paths: u64 = pool.valid().iter().map(|&paths| u64::from(paths)).sum();
+        let is_worth_it = paths * MOST_POINTS_PER_PATH >= pool.point_room() as u64;
+        let encounters = (is_needed && is_worth_it).then(|| pool.encounters(&self.disturbance));
+        Concerned { change: self, pool, encounters }
+    }
+
     /// Whether any path of `light` may be concerned.
     pub fn may_concern(&self, light: usize) -> bool {
         self.lights[light].stale || !self.disturbance.is_empty()
+    }
+}
+
+/// Where the pool has room for more points than this for each path that it holds, looking at the paths one by one is
+/// less work than looking at all points.
+const MOST_POINTS_PER_PATH: u64 = 32;
+
+/// Which paths of a pool a change concerns.
+#[derive(Debug)]
+pub struct Concerned<'a> {
+    change: &'a Change,
+    pool: &'a PathPool,
+    encounters: Option<Encounters>,
+}
+
+impl Concerned<'_> {
+    /// [`Change::concerns`] of the path of `light` in `slot`; none is concerned where there is no path.
+    #[inline]
+    pub fn contains(&self, light: usize, slot: u32) -> bool {
+        match &self.encounters {
+            Some(encounters) => self.change.lights[light].stale || self.pool.is_among(slot, encounters),
+            None => self.change.concerns(light, self.pool.trail(slot).unwrap_or_default()),
+        }
     }
 }
 

@@ -5,6 +5,8 @@
 //! a change of the scene is followed by tracing those again that met it.
 
 use crate::{
+    disturbance::Disturbance,
+    encounters::Encounters,
     flux::{Deposit, VslFlux},
     tracer::{Path, PathBatch},
     trail::Vertex,
@@ -15,6 +17,8 @@ use glam::Vec3;
 #[derive(Clone, Debug)]
 pub struct PathPool {
     slots: Vec<Slot>,
+    /// Where the points of each slot's path are: by themselves, as whole pools are looked through.
+    trails: Vec<Block>,
     deposits: Arena<Deposit>,
     vertices: Arena<Vertex>,
     /// Barycentric coordinates, where the vertices are.
@@ -26,11 +30,10 @@ pub struct PathPool {
     flux: VslFlux,
 }
 
-/// One path: where its deposits and its points are, and when it was traced.
+/// One path: where its deposits are, and when it was traced.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slot {
     deposits: Block,
-    vertices: Block,
     valid: bool,
     birth_ms: u32,
 }
@@ -43,6 +46,7 @@ impl PathPool {
         let count = columns.iter().map(|&(_, column)| column + 1).max().unwrap_or(0) as usize;
         Self {
             slots: vec![Slot::default(); slots],
+            trails: vec![Block::default(); slots],
             deposits: Arena::default(),
             vertices: Arena::default(),
             uvs: Vec::new(),
@@ -67,7 +71,8 @@ impl PathPool {
         self.uvs.resize(self.vertices.storage.len(), [0.0; 2]);
         self.uvs[vertices.range()].copy_from_slice(path.uvs);
         let deposits = self.deposits.insert(path.deposits);
-        self.slots[path.slot as usize] = Slot { deposits, vertices, valid: true, birth_ms };
+        self.slots[path.slot as usize] = Slot { deposits, valid: true, birth_ms };
+        self.trails[path.slot as usize] = vertices;
         self.valid[column as usize] += 1;
         self.flux.add(column, path.deposits, birth_ms);
     }
@@ -83,7 +88,7 @@ impl PathPool {
         self.flux.clear(column);
         self.valid[column as usize] = 0;
         for slot in slots.clone() {
-            let Slot { deposits, vertices, valid, birth_ms } = self.slots[slot as usize];
+            let Slot { deposits, valid, birth_ms } = self.slots[slot as usize];
             if !valid {
                 continue;
             }
@@ -92,7 +97,7 @@ impl PathPool {
                 self.valid[column as usize] += 1;
             } else {
                 self.deposits.remove(deposits);
-                self.vertices.remove(vertices);
+                self.vertices.remove(std::mem::take(&mut self.trails[slot as usize]));
                 self.slots[slot as usize] = Slot::default();
             }
         }
@@ -128,7 +133,7 @@ impl PathPool {
         if old.valid {
             self.flux.subtract(column, self.deposits.get(old.deposits), old.birth_ms);
             self.deposits.remove(old.deposits);
-            self.vertices.remove(old.vertices);
+            self.vertices.remove(std::mem::take(&mut self.trails[slot as usize]));
             self.valid[column as usize] -= 1;
         }
     }
@@ -156,13 +161,35 @@ impl PathPool {
 
     /// The points that the path in `slot` passed; `None` where there is no path.
     pub fn trail(&self, slot: u32) -> Option<&[Vertex]> {
-        let slot = self.slots.get(slot as usize)?;
-        slot.valid.then(|| self.vertices.get(slot.vertices))
+        self.slots.get(slot as usize)?.valid.then(|| self.vertices.get(self.trails[slot as usize]))
+    }
+
+    /// Where the pool's paths met `disturbance`. Takes time in proportion to the most paths that the pool ever held.
+    pub(crate) fn encounters(&self, disturbance: &Disturbance) -> Encounters {
+        Encounters::find(disturbance, &self.vertices.storage)
+    }
+
+    /// Whether the path in `slot` is among those of `encounters`; none is where there is no path.
+    #[inline]
+    pub(crate) fn is_among(&self, slot: u32, encounters: &Encounters) -> bool {
+        encounters.any(self.trails[slot as usize].range())
+    }
+
+    /// Rays that the path in `slot` took; 0 where there is no path.
+    #[inline]
+    pub(crate) fn rays(&self, slot: u32) -> u64 {
+        u64::from(self.trails[slot as usize].length.saturating_sub(1))
+    }
+
+    /// Points that the pool has room for without growing.
+    pub(crate) fn point_room(&self) -> usize {
+        self.vertices.storage.len()
     }
 
     /// The path in `slot`; `None` where there is none.
     pub fn whole_path(&self, slot: u32) -> Option<Path<'_>> {
-        let Slot { deposits, vertices, valid, .. } = *self.slots.get(slot as usize)?;
+        let Slot { deposits, valid, .. } = *self.slots.get(slot as usize)?;
+        let vertices = self.trails[slot as usize];
         valid.then(|| Path {
             slot,
             deposits: self.deposits.get(deposits),
@@ -188,7 +215,8 @@ impl PathPool {
 
     /// Bytes the pool takes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.slots) + self.deposits.bytes() + self.vertices.bytes() + size_of_val(&*self.uvs)
+        let slots = size_of_val(&*self.slots) + size_of_val(&*self.trails);
+        slots + self.deposits.bytes() + self.vertices.bytes() + size_of_val(&*self.uvs)
     }
 }
 
@@ -205,7 +233,8 @@ impl Block {
     }
 }
 
-/// Runs of items in blocks of a power of two, each size with a list of free blocks: replacing never moves others.
+/// Runs of items in blocks of a power of two, at a multiple of it, each size with a list of free blocks: replacing never
+/// moves others.
 #[derive(Clone, Debug, Default)]
 struct Arena<T> {
     storage: Vec<T>,
@@ -218,13 +247,27 @@ impl<T: Copy + Default> Arena<T> {
             return Block::default();
         }
         let class = Self::class(items.len());
-        let start = self.free[class].pop().unwrap_or_else(|| {
-            let start = self.storage.len();
-            self.storage.resize(start + (1 << class), T::default());
-            u32::try_from(start).expect("invariant: a pool's paths have fewer than 2^32 points")
-        });
-        self.storage[start as usize..start as usize + items.len()].copy_from_slice(items);
+        let start = self.free[class].pop().unwrap_or_else(|| self.append(class));
+        let (used, spare) =
+            self.storage[start as usize..start as usize + (1 << class)].split_at_mut(items.len());
+        used.copy_from_slice(items);
+        spare.fill(T::default());
         Block { start, length: items.len() as u16 }
+    }
+
+    /// A new block of a size, at a multiple of it; what is skipped is free.
+    fn append(&mut self, class: usize) -> u32 {
+        let number = |start: usize| {
+            u32::try_from(start).expect("invariant: a pool's paths have fewer than 2^32 points")
+        };
+        let mut end = self.storage.len();
+        while end % (1 << class) != 0 {
+            let skipped = end.trailing_zeros() as usize;
+            self.free[skipped].push(number(end));
+            end += 1 << skipped;
+        }
+        self.storage.resize(end + (1 << class), T::default());
+        number(end)
     }
 
     fn remove(&mut self, block: Block) {

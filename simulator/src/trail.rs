@@ -1,22 +1,24 @@
-//! Turns a path into the points it passed, and says what of a changed scene it met.
-//!
-//! Only a path that met what has changed can differ in the new version of the scene: it was reflected or absorbed by an
-//! object that moved, or one of its segments crosses the box in which a moved object is now. That an object has left
-//! the way of a ray that did not hit it changes nothing.
+//! Turns a path into the points it passed.
 
-use glam::{Mat3A, Vec3, Vec3A, Vec4};
+use glam::{Vec3, Vec3A, Vec4};
 use photonstream_scene::Side;
-use std::ops::Range;
 
 /// A point of a path: where it was emitted, hit something, or left the scene.
 ///
 /// Position and mark lie side by side so that one load fetches both: whole pools are looked through after a change.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Vertex(
     /// Position in the scene's space, m (for a path that left the scene the direction in which it did), and in the bits of
     /// the last component the triangle of a hit and what happened there.
     Vec4,
 );
+
+impl Default for Vertex {
+    /// A beginning at the origin: no segment ends there.
+    fn default() -> Self {
+        Self::emitted(Vec3::ZERO)
+    }
+}
 
 impl PartialEq for Vertex {
     fn eq(&self, other: &Self) -> bool {
@@ -44,8 +46,9 @@ pub enum Event {
 
 const BACK: u32 = 1 << 31;
 const DEPOSITED: u32 = 1 << 30;
-const EMITTED: u32 = DEPOSITED - 1;
-const ESCAPED: u32 = DEPOSITED - 2;
+/// The number of what is no triangle.
+pub(crate) const EMITTED: u32 = DEPOSITED - 1;
+pub(crate) const ESCAPED: u32 = DEPOSITED - 2;
 
 /// Most triangles of a scene whose paths can be told apart.
 pub const MAX_TRIANGLES: u32 = ESCAPED;
@@ -73,8 +76,21 @@ impl Vertex {
         self.0.w.to_bits()
     }
 
+    /// The triangle that was hit, or [`EMITTED`] or [`ESCAPED`].
     #[inline]
-    fn place(&self) -> Vec3A {
+    pub(crate) fn number(&self) -> u32 {
+        self.mark() & !(BACK | DEPOSITED)
+    }
+
+    /// The position's components and the number.
+    #[inline]
+    pub(crate) fn parts(&self) -> ([f32; 3], u32) {
+        let [x, y, z, _] = self.0.to_array();
+        ([x, y, z], self.number())
+    }
+
+    #[inline]
+    pub(crate) fn place(&self) -> Vec3A {
         Vec3A::from_vec4(self.0)
     }
 
@@ -85,7 +101,7 @@ impl Vertex {
 
     /// What happened.
     pub fn event(&self) -> Event {
-        match self.mark() & !(BACK | DEPOSITED) {
+        match self.number() {
             EMITTED => Event::Emitted,
             ESCAPED => Event::Escaped,
             triangle => Event::Hit {
@@ -99,169 +115,6 @@ impl Vertex {
     /// The same hit in a scene in which its triangle has another number.
     pub(crate) fn renumbered(self, triangle: u32) -> Self {
         Self::new(self.position(), triangle | (self.mark() & (BACK | DEPOSITED)))
-    }
-}
-
-/// What encloses something that has moved, with a margin for rounding: a box along the scene's axes, a box along its own,
-/// and a sphere, each of which it lies in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Obstacle {
-    low: Vec3A,
-    high: Vec3A,
-    /// Centre of sphere and own box.
-    centre: Vec3A,
-    radius: f32,
-    /// Half the own box, along its own axes.
-    half: Vec3A,
-    /// From the scene's axes to its own.
-    own_from_scene: Mat3A,
-}
-
-/// Margin of an obstacle relative to the largest coordinate that a path has in the scene. A ray begins up to 2⁻¹⁸ of a
-/// triangle's coordinates beside the point that is kept of it, and the tests below round by some 2⁻²¹.
-const MARGIN: f32 = 1.0 / (1 << 15) as f32;
-
-impl Obstacle {
-    /// What encloses `points`, a body's corners in the scene's space; its own axes are the rows of `own_from_scene`, a
-    /// rotation. No coordinate of a path or of the body exceeds `reach`. `None` without points.
-    pub(crate) fn around(
-        points: impl Iterator<Item = Vec3> + Clone,
-        own_from_scene: Mat3A,
-        reach: f32,
-    ) -> Option<Self> {
-        let bounds = |map: &dyn Fn(Vec3) -> Vec3A| {
-            points.clone().map(map).map(|p| (p, p)).reduce(|(l, h), (a, b)| (l.min(a), h.max(b)))
-        };
-        let (low, high) = bounds(&Vec3A::from)?;
-        let (own_low, own_high) = bounds(&|p| own_from_scene * Vec3A::from(p))?;
-        let margin = reach * MARGIN;
-        let centre = own_from_scene.transpose() * (0.5 * (own_low + own_high));
-        let radius = points.map(|p| Vec3A::from(p).distance(centre)).fold(0.0, f32::max);
-        Some(Self {
-            low: low - margin,
-            high: high + margin,
-            centre,
-            radius: radius + margin,
-            half: 0.5 * (own_high - own_low) + margin,
-            own_from_scene,
-        })
-    }
-
-    /// Something around both.
-    pub(crate) fn union(self, other: Self) -> Self {
-        let (low, high) = (self.low.min(other.low), self.high.max(other.high));
-        let half = 0.5 * (high - low);
-        Self {
-            low,
-            high,
-            centre: low + half,
-            radius: 1.01 * half.length(),
-            half,
-            own_from_scene: Mat3A::IDENTITY,
-        }
-    }
-
-    /// Whether the segment from `a` to `b` may cross it.
-    #[inline]
-    fn is_crossed(&self, a: Vec3A, b: Vec3A) -> bool {
-        let beside = a.min(b).cmpgt(self.high) | a.max(b).cmplt(self.low);
-        !beside.any() && self.is_crossed_within(a, b)
-    }
-
-    /// The same, where the boxes around both meet.
-    #[inline(never)]
-    fn is_crossed_within(&self, a: Vec3A, b: Vec3A) -> bool {
-        let (along, from) = (b - a, self.centre - a);
-        let share = (from.dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        if (from - share * along).length_squared() > self.radius * self.radius {
-            return false;
-        }
-        // By the axes of its own box, and those across them and the segment.
-        let h = self.own_from_scene * (0.5 * along);
-        let c = self.own_from_scene * (0.5 * along - from);
-        let size = h.abs();
-        if c.abs().cmpgt(self.half + size).any() {
-            return false;
-        }
-        let across = c.cross(h).abs();
-        let rotated = |v: Vec3A| (Vec3A::new(v.y, v.z, v.x), Vec3A::new(v.z, v.x, v.y));
-        let ((half1, half2), (size1, size2)) = (rotated(self.half), rotated(size));
-        !across.cmpgt(half1 * size2 + half2 * size1).any()
-    }
-
-    /// Whether the ray from `a` along the unit vector `direction` may cross it.
-    #[inline]
-    fn is_crossed_by_ray(&self, a: Vec3A, direction: Vec3A) -> bool {
-        let beyond = self.centre.distance(a) + self.radius;
-        self.is_crossed(a, a + direction * (1.001 * beyond))
-    }
-}
-
-/// What has changed between two versions of a scene for a path that met it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Disturbance {
-    /// Triangles whose hits are no longer what they were; sorted, none adjacent.
-    triangles: Vec<Range<u32>>,
-    /// Where something is now that was not there before.
-    obstacles: Vec<Obstacle>,
-}
-
-/// More boxes than this are joined: each costs a test for every segment.
-const MOST_OBSTACLES: usize = 6;
-
-impl Disturbance {
-    /// From ranges of triangles in ascending order, and boxes.
-    pub(crate) fn new(triangles: impl IntoIterator<Item = Range<u32>>, mut obstacles: Vec<Obstacle>) -> Self {
-        let mut joined: Vec<Range<u32>> = Vec::new();
-        for range in triangles.into_iter().filter(|range| !range.is_empty()) {
-            match joined.last_mut() {
-                Some(last) if last.end == range.start => last.end = range.end,
-                _ => joined.push(range),
-            }
-        }
-        while obstacles.len() > MOST_OBSTACLES {
-            obstacles = obstacles
-                .chunks(2)
-                .map(|pair| {
-                    pair.iter().copied().reduce(Obstacle::union).expect("invariant: chunks are not empty")
-                })
-                .collect();
-        }
-        Self { triangles: joined, obstacles }
-    }
-
-    /// Whether it concerns no path.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.triangles.is_empty() && self.obstacles.is_empty()
-    }
-
-    /// Whether the path through `vertices` may differ in the new version.
-    #[inline]
-    pub(crate) fn concerns(&self, vertices: &[Vertex]) -> bool {
-        let Some((first, rest)) = vertices.split_first() else { return false };
-        let mut from = first.place();
-        for vertex in rest {
-            let number = vertex.mark() & !(BACK | DEPOSITED);
-            let to = vertex.place();
-            if number == ESCAPED {
-                return self.obstacles.iter().any(|obstacle| obstacle.is_crossed_by_ray(from, to));
-            }
-            if self.has_changed(number) || self.obstacles.iter().any(|obstacle| obstacle.is_crossed(from, to))
-            {
-                return true;
-            }
-            from = to;
-        }
-        false
-    }
-
-    #[inline]
-    fn has_changed(&self, triangle: u32) -> bool {
-        if let [range] = self.triangles.as_slice() {
-            return range.contains(&triangle);
-        }
-        let next = self.triangles.partition_point(|range| range.end <= triangle);
-        self.triangles.get(next).is_some_and(|range| range.start <= triangle)
     }
 }
 
@@ -279,90 +132,5 @@ mod tests {
             let event = vertex.renumbered(MAX_TRIANGLES - 1).event();
             assert_eq!(event, Event::Hit { triangle: MAX_TRIANGLES - 1, side, deposited });
         }
-    }
-
-    fn boxed(centre: Vec3, half: Vec3, turn: Mat3A, reach: f32) -> Obstacle {
-        let corners = (0..8).map(move |i| {
-            let side = |bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            centre + Vec3::from(turn.transpose() * Vec3A::from(half * Vec3::new(side(0), side(1), side(2))))
-        });
-        Obstacle::around(corners, turn, reach).unwrap()
-    }
-
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> f32 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 40) as f32 / (1u64 << 24) as f32 * 2.0 - 1.0
-        }
-
-        fn point(&mut self) -> Vec3 {
-            Vec3::new(self.next(), self.next(), self.next())
-        }
-    }
-
-    /// Against points of the segment itself: N = 20 000 segments and turned boxes, seed 1; none that has a point inside is
-    /// missed, and of those that are taken at most 2 % have no point within twice the spacing of the points.
-    #[test]
-    fn no_crossing_is_missed_and_few_are_invented() {
-        let mut numbers = Numbers(1);
-        let (mut taken, mut invented) = (0, 0);
-        for _ in 0..20_000 {
-            let (a, b, centre, half) =
-                (numbers.point(), numbers.point(), numbers.point(), numbers.point().abs() * 0.4);
-            let turn =
-                Mat3A::from_euler(glam::EulerRot::XYZ, 3.0 * numbers.next(), numbers.next(), numbers.next());
-            let obstacle = boxed(centre, half, turn, 1.0);
-            let crossed = obstacle.is_crossed(a.into(), b.into());
-            let inside = |p: Vec3| (Vec3::from(turn * Vec3A::from(p - centre)).abs() - half).max_element();
-            let nearest =
-                (0..=400).map(|i| inside(a.lerp(b, i as f32 / 400.0))).fold(f32::INFINITY, f32::min);
-            assert!(crossed || nearest > 0.0, "{a} {b} {centre} {half}");
-            taken += u32::from(crossed);
-            invented += u32::from(crossed && nearest > 2.0 * a.distance(b) / 400.0);
-            let ray = obstacle.is_crossed_by_ray(a.into(), (b - a).normalize().into());
-            assert!(ray || !crossed, "a ray goes farther than its segment");
-        }
-        assert!(taken > 500 && invented * 50 < taken, "{invented} of {taken}");
-    }
-
-    /// A ball is a ball: of N = 20 000 segments near it those that pass its box's corners are not taken.
-    #[test]
-    fn round_bodies_are_enclosed_by_spheres() {
-        let mut numbers = Numbers(2);
-        let ball = (0..2000).map(|i| {
-            let z = (i as f32 + 0.5) / 1000.0 - 1.0;
-            let turn = i as f32 * 2.399_963;
-            Vec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z)
-        });
-        let obstacle = Obstacle::around(ball, Mat3A::IDENTITY, 4.0).unwrap();
-        for _ in 0..20_000 {
-            let (a, b) = (3.0 * numbers.point(), 3.0 * numbers.point());
-            let along = b - a;
-            let share = (-a.dot(along) / along.length_squared()).clamp(0.0, 1.0);
-            let distance = (a + share * along).length();
-            let crossed = obstacle.is_crossed(a.into(), b.into());
-            assert!(crossed || distance > 1.0);
-            assert!(!crossed || distance < 1.01, "{distance}");
-        }
-    }
-
-    #[test]
-    fn paths_that_met_nothing_new_are_left_alone() {
-        let at = |x: f32, triangle| Vertex::hit(Vec3::new(x, 0.0, 0.0), triangle, Side::Front, true);
-        let path = [Vertex::emitted(Vec3::ZERO), at(1.0, 5), at(2.0, 9), Vertex::escaped(Vec3::Y)];
-        let touched = |ranges: &[Range<u32>]| Disturbance::new(ranges.to_vec(), vec![]).concerns(&path);
-        assert!(touched(&[5..6]) && touched(&[0..1, 9..12]) && touched(&[0..2, 4..8, 20..30]));
-        assert!(!touched(&[6..9]) && !touched(&[0..5, 6..9, 10..99]) && !touched(&[]));
-        let obstacle =
-            |low: Vec3, high: Vec3| boxed(0.5 * (low + high), 0.5 * (high - low), Mat3A::IDENTITY, 100.0);
-        let boxed = |low, high| Disturbance::new([], vec![obstacle(low, high)]).concerns(&path);
-        assert!(boxed(Vec3::new(1.4, -0.1, -0.1), Vec3::new(1.6, 0.1, 0.1)));
-        assert!(boxed(Vec3::new(1.9, 50.0, -0.1), Vec3::new(2.1, 60.0, 0.1)), "beyond where it left");
-        assert!(!boxed(Vec3::new(1.4, 0.1, -0.1), Vec3::new(1.6, 0.3, 0.1)));
-        assert!(!boxed(Vec3::new(1.9, -60.0, -0.1), Vec3::new(2.1, -50.0, 0.1)));
-        let many = (0..40).map(|i| obstacle(Vec3::splat(9.0 + i as f32), Vec3::splat(9.5 + i as f32)));
-        assert!(Disturbance::new([], many.collect()).obstacles.len() <= MOST_OBSTACLES);
     }
 }

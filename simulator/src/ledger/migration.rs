@@ -5,13 +5,14 @@
 //! vertices in the scene's space, lights the same samples. The order of triangles among kept objects is that of their
 //! names in both scenes, so that rays that hit two of them at one distance keep their hit.
 
-use super::{FILLED, Ledger, STALE, UNDER_WAY, rays};
+use super::{FILLED, Ledger, STALE, UNDER_WAY};
 use crate::{
     change::{LightRevision, obstacle, reach_of, reflects_alike},
+    disturbance::Disturbance,
     flux::Deposit,
     simulation::Simulation,
     tracer::Path,
-    trail::{Disturbance, Event, Vertex},
+    trail::{Event, Vertex},
 };
 use glam::Vec3;
 use photonstream_scene::{Object, Scene};
@@ -177,7 +178,7 @@ impl Ledger {
                 if is_stale {
                     next.savings.retraced_paths += u64::from(mark & STALE == 0);
                 } else {
-                    next.savings.rays_saved += rays(&self.pool, old_slot);
+                    next.savings.rays_saved += self.pool.rays(old_slot);
                 }
                 if !is_replay {
                     next.given[slot as usize] = self.given.get(old_slot as usize).copied().unwrap_or(1);

@@ -207,23 +207,20 @@ impl Ledger {
 
     /// Marks the paths that `change` concerns.
     fn make_stale(&mut self, change: &Change) {
+        let concerned = change.look_through(&self.pool);
         for (index, light) in self.emitters.lights.iter().enumerate() {
             let first = light.slots.start as usize;
             let (pool, count) = (&self.pool, self.active[index] as usize);
-            let may_concern = change.may_concern(index);
             let look = |(marks, start): (&mut [u8], usize)| {
                 let mut found = Found::default();
                 for (mark, slot) in marks.iter_mut().zip(start as u32..) {
                     if *mark & (FILLED | STALE) != FILLED {
                         continue;
                     }
-                    let trail = pool.trail(slot).unwrap_or_default();
-                    if may_concern && change.concerns(index, trail) {
-                        *mark |= STALE;
-                        found.stale += 1;
-                    } else {
-                        found.kept_rays += trail.len().saturating_sub(1) as u64;
-                    }
+                    let is_stale = concerned.contains(index, slot);
+                    *mark |= if is_stale { STALE } else { 0 };
+                    found.stale += u32::from(is_stale);
+                    found.kept_rays += if is_stale { 0 } else { pool.rays(slot) };
                 }
                 found
             };
@@ -544,9 +541,4 @@ impl Ledger {
         let (flux, more) = (self.pool.flux(), self.refinement.flux());
         (0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales))
     }
-}
-
-/// Rays that the path in `slot` took.
-fn rays(pool: &PathPool, slot: u32) -> u64 {
-    pool.trail(slot).map_or(0, |vertices| vertices.len().saturating_sub(1) as u64)
 }

@@ -10,12 +10,19 @@ struct LightQueue {
     slots: u32,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug)]
 struct Entry {
     /// 0 for an empty slot; else the larger the brighter the path that has to be replaced.
     rank: u8,
     /// Counted down, so that of equals the first slot is the greatest.
     order: u32,
+}
+
+impl Entry {
+    /// By rank, then by order.
+    fn key(&self) -> u64 {
+        u64::from(self.rank) << 32 | u64::from(self.order)
+    }
 }
 
 /// The slots that have to be traced, by light.
@@ -49,8 +56,8 @@ impl Queue {
     pub(super) fn sort(&mut self) {
         for light in &mut self.lights {
             // Most slots come in order, and of one rank.
-            if !light.waiting.is_sorted() {
-                light.waiting.sort_unstable();
+            if !light.waiting.is_sorted_by_key(Entry::key) {
+                light.waiting.sort_unstable_by_key(Entry::key);
             }
         }
     }
