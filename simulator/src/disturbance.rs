@@ -270,6 +270,7 @@ pub(crate) mod tests {
     }
 
     #[test]
+    #[allow(clippy::single_range_in_vec_init)] // A list of one range is meant.
     fn paths_that_met_nothing_new_are_left_alone() {
         let at = |x: f32, triangle| Vertex::hit(Vec3::new(x, 0.0, 0.0), triangle, Side::Front, true);
         let path = [Vertex::emitted(Vec3::ZERO), at(1.0, 5), at(2.0, 9), Vertex::escaped(Vec3::Y)];

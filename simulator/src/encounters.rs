@@ -265,7 +265,7 @@ mod tests {
         let ranges = (0..ranges).map(|i| 5 * i + 1..5 * i + 2);
         let turned = |numbers: &mut Numbers| {
             // Each third is a cube, whose sphere is smaller than the box around it when it is turned.
-            let half = if case % 3 == 0 { Vec3::splat(0.2) } else { numbers.point().abs() * 0.3 };
+            let half = if case.is_multiple_of(3) { Vec3::splat(0.2) } else { numbers.point().abs() * 0.3 };
             let turn = Mat3A::from_euler(glam::EulerRot::XYZ, numbers.next(), numbers.next(), numbers.next());
             boxed(numbers.point(), half, turn, 2.0)
         };

@@ -261,7 +261,7 @@ impl<T: Copy + Default> Arena<T> {
             u32::try_from(start).expect("invariant: a pool's paths have fewer than 2^32 points")
         };
         let mut end = self.storage.len();
-        while end % (1 << class) != 0 {
+        while !end.is_multiple_of(1 << class) {
             let skipped = end.trailing_zeros() as usize;
             self.free[skipped].push(number(end));
             end += 1 << skipped;
