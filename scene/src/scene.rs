@@ -64,6 +64,8 @@ pub struct Scene {
     pub notices: Vec<String>,
     /// What moves and dims lights and objects; as loaded, the scene is what it is at time 0.
     pub animation: Arc<Animation>,
+    /// Files that the scene was read from, beside its config.
+    pub files: Arc<[std::path::PathBuf]>,
     /// The mesh of each object, to be posed anew.
     pub(crate) rest_meshes: Arc<[RestMesh]>,
     /// How each object stands.

@@ -84,7 +84,7 @@ impl Overrides {
 pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
     let stop = stop_on_signals()?;
     let begun = Instant::now();
-    let source = ConfigSource { path: args.config.clone(), overrides: args.overrides.clone() };
+    let mut source = ConfigSource::new(&args.config, args.overrides.clone());
     let scene = source.load()?;
     for notice in &scene.notices {
         tracing::warn!("{}: {notice}", scene.name);

@@ -62,6 +62,7 @@ pub(super) fn read(
         context.notices.push(format!("object \"{name}\": {problem}; its `material` is used instead"));
     }
     let excluded = excluded(&import, obj.exclude.get_or_insert_default(), &field.key("exclude"))?;
+    context.inputs.files.extend(import.files.iter().cloned());
     context.inputs.contents.insert(name.to_owned(), (absolute, import.content));
 
     let mut parts = 0;

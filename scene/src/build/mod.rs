@@ -66,8 +66,12 @@ impl SceneConfig {
         let render = settings::render(&mut self.render, &root.key("render"))?;
         let mut materials = Materials::read(&self.material, &root.key("material"))?;
 
-        let mut inputs =
-            Inputs { parts: BTreeMap::new(), lights: BTreeMap::new(), contents: BTreeMap::new() };
+        let mut inputs = Inputs {
+            parts: BTreeMap::new(),
+            lights: BTreeMap::new(),
+            contents: BTreeMap::new(),
+            files: Vec::new(),
+        };
         let mut notices = Vec::new();
         objects::read(
             &mut self.object,
@@ -117,6 +121,7 @@ impl SceneConfig {
             features,
             notices,
             animation: Arc::new(animation),
+            files: inputs.files.into(),
             rest_meshes: rest_meshes.into(),
             poses,
         })
@@ -125,6 +130,8 @@ impl SceneConfig {
 
 /// What the tables of a config contribute to a scene, by name.
 struct Inputs<'a> {
+    /// Files that were read.
+    files: Vec<std::path::PathBuf>,
     parts: BTreeMap<String, Part<'a>>,
     /// Lights without a surface, in the config's coordinates.
     lights: BTreeMap<String, lights::PlainLight>,

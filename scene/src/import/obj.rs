@@ -18,6 +18,8 @@ pub(crate) struct Import {
     pub(crate) materials: BTreeMap<String, ImportedMaterial>,
     /// What could not be read of the MTL files; faces may lack their material.
     pub(crate) material_problem: Option<String>,
+    /// All files read, and MTL files that it names and that are not there.
+    pub(crate) files: Vec<PathBuf>,
     /// Hash of the content of all files read.
     pub(crate) content: blake3::Hash,
 }
@@ -55,11 +57,13 @@ pub(crate) fn load_obj(path: &Path) -> Result<Import, (PathBuf, String)> {
     hash_file(&mut hasher, &bytes);
 
     let read = RefCell::new(Vec::new());
+    let files = RefCell::new(vec![path.to_owned()]);
     let problems = RefCell::new(Vec::new());
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let positions_and_faces = without_texture_coordinates_and_normals(&bytes);
     let loaded = tobj::load_obj_buf(&mut positions_and_faces.as_slice(), &options, |name| {
         let file = path.parent().unwrap_or(Path::new("")).join(name);
+        files.borrow_mut().push(file.clone());
         let content = fs::read(&file).map_err(|e| {
             problems.borrow_mut().push(format!("material file {} cannot be read ({e})", file.display()));
             tobj::LoadError::OpenFileFailed
@@ -87,6 +91,7 @@ pub(crate) fn load_obj(path: &Path) -> Result<Import, (PathBuf, String)> {
     groups.retain(|_, group| !group.mesh.triangles.is_empty());
     let materials = materials.iter().map(|m| (m.name.replace('/', "_"), imported_material(m))).collect();
     Ok(Import {
+        files: files.into_inner(),
         groups,
         materials,
         material_problem: problems.into_inner().into_iter().next(),

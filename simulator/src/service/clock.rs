@@ -47,6 +47,7 @@ impl Clock {
     pub(super) fn step(&mut self) {
         self.time_s += self.fixed_step.unwrap_or(self.period).as_secs_f64();
         self.last = Instant::now();
+        self.waits = true;
     }
 
     /// The last step has been shown whole.
@@ -58,6 +59,10 @@ impl Clock {
         if self.paused != paused {
             (self.paused, self.last) = (paused, Instant::now());
         }
+    }
+
+    pub(super) fn is_paused(&self) -> bool {
+        self.paused
     }
 
     pub(super) fn is_fixed(&self) -> bool {

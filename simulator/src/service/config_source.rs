@@ -11,15 +11,31 @@ pub struct ConfigSource {
     pub path: PathBuf,
     /// What replaces its settings, whatever it says.
     pub overrides: Overrides,
+    /// The text that was loaded last.
+    text: Option<String>,
 }
 
 impl ConfigSource {
+    /// The config at `path`.
+    pub fn new(path: impl Into<PathBuf>, overrides: Overrides) -> Self {
+        Self { path: path.into(), overrides, text: None }
+    }
+
     /// The scene as the file is now.
     ///
     /// # Errors
     /// If it cannot be read, or is not valid.
-    pub fn load(&self) -> Result<Scene, SceneError> {
-        self.finish(SceneConfig::from_file(&self.path)?)
+    pub fn load(&mut self) -> Result<Scene, SceneError> {
+        let text = std::fs::read_to_string(&self.path)
+            .map_err(|source| SceneError::Read { file: self.path.clone(), source })?;
+        let scene = self.load_text(&text)?;
+        self.text = Some(text);
+        Ok(scene)
+    }
+
+    /// The text that was loaded last.
+    pub(super) fn text(&self) -> Option<&str> {
+        self.text.as_deref()
     }
 
     /// The scene that `text` would be in the place of the file.
@@ -41,10 +57,11 @@ impl ConfigSource {
     }
 }
 
-/// The files that a loaded scene was read from, beside its config.
-pub(super) fn assets(scene: &Scene) -> Vec<PathBuf> {
-    // The resolved text has their full paths.
-    let config = SceneConfig::from_text(&scene.resolved_text, Path::new(""));
-    let objects = config.map(|config| config.object).unwrap_or_default();
-    objects.into_values().filter_map(|object| Some(PathBuf::from(object.obj?.path))).collect()
+/// The files that a scene which cannot be loaded waits for.
+pub(super) fn missing(error: &SceneError) -> Vec<PathBuf> {
+    match error {
+        SceneError::AssetMissing { looked, .. } => looked.clone(),
+        SceneError::Asset { asset, .. } => vec![asset.clone()],
+        _ => Vec::new(),
+    }
 }

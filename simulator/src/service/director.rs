@@ -83,6 +83,8 @@ enum Event {
     Stop,
     Request(Incoming),
     News(News),
+    /// The watcher has ended.
+    Unwatched,
     /// The light of a version was shown whole.
     Settled(u64),
     /// It is time to look at the animation.
@@ -97,6 +99,10 @@ struct Director {
     still: Arc<Still>,
     clock: Clock,
     config: Option<ConfigSource>,
+    /// Why the animation stood still last.
+    animation_error: String,
+    /// Hash of the config that was loaded last.
+    loaded_hash: u64,
     news: flume::Receiver<News>,
     /// Ends the watcher when it is dropped.
     watching: Option<(flume::Sender<()>, JoinHandle<()>)>,
@@ -157,6 +163,7 @@ impl Director {
             emptied: Arc::clone(&emptied),
             latest_frame: Arc::clone(&latest_frame),
             orderly: Arc::clone(&orderly),
+            refused: None,
         };
         let publisher = {
             let farewell = Farewell(farewells.clone());
@@ -197,6 +204,8 @@ impl Director {
             scene_name: scene.name.clone(),
             clock: Clock::new(scene.streaming.fixed_step_ms, period),
             config: options.config.clone(),
+            loaded_hash: scene.hash,
+            animation_error: String::new(),
             news,
             watching,
             settled,
@@ -225,7 +234,7 @@ impl Director {
                 .recv(&self.settled, |settled| settled.map_or(Event::ActorGone, Event::Settled));
             // A watcher that is not there has nothing to tell.
             let selector = match &self.watching {
-                Some(_) => selector.recv(&self.news, |news| news.map_or(Event::ActorGone, Event::News)),
+                Some(_) => selector.recv(&self.news, |news| news.map_or(Event::Unwatched, Event::News)),
                 None => selector,
             };
             let is_animated = !self.simulation.scene.animation.is_empty();
@@ -242,9 +251,16 @@ impl Director {
                 Event::Settled(_) => {}
                 Event::Tick => {
                     self.clock.tick(Instant::now());
-                    self.animate();
+                    if !self.animate() {
+                        // There is nothing to wait for.
+                        self.clock.settled();
+                    }
                 }
                 Event::News(news) => self.hear(news),
+                Event::Unwatched => {
+                    self.watching = None;
+                    self.refuse("the watcher of the config has failed, a bug: please report it; changes need --reload");
+                }
                 Event::Request(incoming) => {
                     let Some(Incoming { request, replier, .. }) = self.edit(incoming) else { continue };
                     let ends = matches!(request, Request::Shutdown);
@@ -269,7 +285,7 @@ impl Director {
                 self.change(Change::Resume)
             }
             Request::Step => {
-                if !self.simulation.scene.animation.is_empty() {
+                if self.clock.is_paused() {
                     self.clock.step();
                     self.animate();
                 }
@@ -303,31 +319,31 @@ impl Director {
 
     /// Loads the config again, whether it has changed or not.
     fn reload(&mut self) -> Reply {
-        let Some(config) = &self.config else {
+        let Some(config) = &mut self.config else {
             return Reply::error("unsupported", "this simulation was not started from a config file");
         };
         match config.load() {
             Ok(scene) => self.show_config(scene),
-            Err(error) => {
-                let reply = Reply::error(edits::code(&error), error.to_string());
-                self.refuse(&error.to_string());
-                reply
-            }
+            // Whoever asked is told; the watcher tells all others, as long as it is so.
+            Err(error) => Reply::error(edits::code(&error), error.to_string()),
         }
     }
 
     /// Follows what the watcher has seen.
     fn hear(&mut self, news: News) {
         match news {
+            // As loaded it is what is simulated already: edits since then stay.
+            News::Scene(scene) if scene.hash == self.loaded_hash => {
+                if !self.still.notice.is_empty() {
+                    tracing::info!("the config is again what is simulated");
+                    self.tell_all("");
+                }
+            }
             News::Scene(scene) => {
                 tracing::info!("the config has changed: it is simulated from now on");
                 self.show_config(*scene);
             }
             News::Broken(reason) => self.refuse(&reason),
-            News::Restored => {
-                tracing::info!("the config is again what is simulated");
-                self.tell_all("");
-            }
         }
     }
 
@@ -337,6 +353,7 @@ impl Director {
         for notice in &scene.notices {
             tracing::warn!("{}: {notice}", scene.name);
         }
+        self.loaded_hash = scene.hash;
         self.clock.set(scene.streaming.fixed_step_ms, publish_period(&scene));
         let scene = self.at_present(&scene).unwrap_or(scene);
         let mut still = self.still.next(&scene);
@@ -362,7 +379,7 @@ impl Director {
     }
 
     /// The scene at the time that it is; `None` where nothing in it is animated.
-    fn at_present(&self, scene: &Scene) -> Option<Scene> {
+    fn at_present(&mut self, scene: &Scene) -> Option<Scene> {
         if scene.animation.is_empty() {
             return None;
         }
@@ -370,18 +387,27 @@ impl Director {
         match scene.animation.apply(self.clock.time_s(), &mut edit) {
             Ok(()) => Some(edit.finish()),
             Err(error) => {
-                tracing::warn!("the animation stands still: {error}");
+                let error = error.to_string();
+                if self.animation_error != error {
+                    tracing::warn!("the animation stands still: {error}");
+                    self.animation_error = error;
+                }
                 None
             }
         }
     }
 
-    /// Puts what is animated where it is now.
-    fn animate(&mut self) {
+    /// Puts what is animated where it is now; false where it is there already, or cannot be.
+    fn animate(&mut self) -> bool {
         let received_ns = monotonic_ns();
-        if let Some(scene) = self.at_present(&self.simulation.scene) {
-            self.show(scene, received_ns);
+        let before = Arc::clone(&self.simulation.scene);
+        let Some(scene) = self.at_present(&before) else { return false };
+        let is_still = Arc::ptr_eq(&scene.geometry, &before.geometry) && scene.lights == before.lights;
+        if is_still {
+            return false;
         }
+        self.show(scene, received_ns);
+        true
     }
 
     /// Applies an edit, together with all edits that wait behind it, as one new version of the scene. Returns the request

@@ -101,6 +101,9 @@ pub struct State {
     pub counters: Counters,
 }
 
+/// A frame that is to be shown whole is shown after this time all the same.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+
 /// Publishing may take at most this share of the ledger's time.
 const PUBLISHING_SHARE: u32 = 10;
 
@@ -155,6 +158,8 @@ struct Progress {
     /// Something differs from the last published frame.
     changed: bool,
     next_frame: Instant,
+    /// When the last frame was shown, or the first change after it came.
+    shown_at: Instant,
     /// Snapshots sent, each of which becomes a frame.
     frames: u64,
     edit_received_ns: u64,
@@ -191,6 +196,7 @@ impl LedgerActor {
             stepping: false,
             changed: true,
             next_frame: started + period(&self.simulation),
+            shown_at: started,
             frames: 0,
             edit_received_ns: 0,
             traced_ns: 0,
@@ -206,7 +212,10 @@ impl LedgerActor {
             progress.note_activity(now);
             let done = self.is_done(&progress);
             let settled = progress.ledger.in_flight() == 0;
-            let may_be_shown = !progress.only_whole || progress.paused || progress.ledger.is_settled();
+            // Of a step, and of fixed steps, the whole light is shown; in a drag that is faster than light not for ever.
+            let wants_whole = (progress.only_whole && !progress.paused) || progress.stepping;
+            let has_waited = progress.changed && now >= progress.shown_at + LONGEST_WAIT;
+            let may_be_shown = !wants_whole || progress.ledger.is_settled() || done || has_waited;
             let is_at_rest = settled && (done || progress.paused);
             let is_due = now >= progress.next_frame || is_at_rest;
             if progress.changed && may_be_shown && is_due {
@@ -216,8 +225,10 @@ impl LedgerActor {
                     Published::Gone => break,
                 }
             }
-            let message = if progress.changed && may_be_shown {
-                match self.inbox.recv_deadline(progress.next_frame) {
+            let message = if progress.changed {
+                let late = progress.shown_at + LONGEST_WAIT;
+                let due = if may_be_shown { progress.next_frame } else { late };
+                match self.inbox.recv_deadline(due) {
                     Ok(message) => message,
                     Err(flume::RecvTimeoutError::Timeout) => continue,
                     Err(flume::RecvTimeoutError::Disconnected) => break,
@@ -325,6 +336,7 @@ impl LedgerActor {
         progress.publishing = now - begun;
         progress.next_frame = now + period(&progress.simulation).max(progress.publishing * PUBLISHING_SHARE);
         progress.frames += 1;
+        progress.shown_at = now;
         progress.changed = false;
         progress.stepping = false;
         if progress.unsettled && progress.ledger.is_settled() {
@@ -419,6 +431,9 @@ impl Progress {
         self.still = still;
         (self.time_s, self.only_whole, self.unsettled) = (time_s, only_whole, true);
         self.versions += 1;
+        if !self.changed {
+            self.shown_at = Instant::now();
+        }
         self.edit_received_ns = received_ns;
         // An edit that needs no ray is traced with its arrival.
         self.traced_ns = monotonic_ns();

@@ -12,7 +12,7 @@ use std::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// What the ledger wants published.
@@ -109,6 +109,15 @@ pub(super) struct PublisherActor {
     /// Set before an orderly end; without it the channel is left as a crash leaves it, so that renderers wait for the
     /// simulator to come back instead of taking a half-lit frame for the last.
     pub(super) orderly: Arc<AtomicBool>,
+    /// The segment that could not be made.
+    pub(super) refused: Option<Refused>,
+}
+
+/// A segment that could not be made.
+pub(super) struct Refused {
+    spec: SegmentSpec,
+    when: Instant,
+    reason: String,
 }
 
 impl PublisherActor {
@@ -132,10 +141,23 @@ impl PublisherActor {
                     if last.as_ref().is_some_and(|last| last.paused) != snapshot.paused {
                         self.publisher.set_paused(snapshot.paused);
                     }
-                    self.publish(&snapshot)?;
-                    if let Some(old) = last.replace(snapshot) {
+                    let free = match (self.make_room(&snapshot), &last) {
+                        (Ok(()), _) => {
+                            self.publish(&snapshot, &snapshot.still.notice)?;
+                            last.replace(snapshot)
+                        }
+                        // The last scene goes on, as with a config that is not valid.
+                        (Err(()), Some(shown)) => {
+                            let reason = self.refused.as_ref().map_or("", |refused| &refused.reason);
+                            self.publish(shown, &format!("the changed scene is not shown: {reason}"))?;
+                            Some(snapshot)
+                        }
+                        // The first scene has the segment that it was made for.
+                        (Err(()), None) => Some(snapshot),
+                    };
+                    if let Some(free) = free {
                         // There are as many places as sets of records.
-                        let _ = self.emptied.push(old.vsls);
+                        let _ = self.emptied.push(free.vsls);
                     }
                 }
                 Err(flume::RecvTimeoutError::Timeout) => {
@@ -143,7 +165,7 @@ impl PublisherActor {
                         tracing::warn!(
                             "the channel's names were removed by someone: publishing under new ones"
                         );
-                        self.publish(last)?;
+                        self.publish(last, &last.still.notice)?;
                     }
                 }
                 Err(flume::RecvTimeoutError::Disconnected) => return Ok(()),
@@ -152,18 +174,33 @@ impl PublisherActor {
     }
 
     /// Takes another segment where the scene is another one, or does not fit into the present one.
-    fn make_room(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
+    ///
+    /// # Errors
+    /// Where there is no room for it, which is then noted; tried again after a while.
+    fn make_room(&mut self, snapshot: &Snapshot) -> Result<(), ()> {
         let spec = self.publisher.spec();
         let least = snapshot.still.spec(snapshot.vsls.records.len(), Some(spec));
-        if least != *spec {
-            // Only a larger or another scene: what is too large is kept for the next one.
-            self.publisher.replace_segment(&least)?;
+        // Only a larger or another scene needs another one: what is too large is kept for the next.
+        if least == *spec {
+            self.refused = None;
+            return Ok(());
         }
-        Ok(())
+        let before = self.refused.as_ref().filter(|refused| refused.spec == least);
+        if before.is_some_and(|refused| refused.when.elapsed() < LOOK) {
+            return Err(());
+        }
+        let Err(error) = self.publisher.replace_segment(&least) else {
+            self.refused = None;
+            return Ok(());
+        };
+        if before.is_none() {
+            tracing::warn!("the changed scene is not shown, the last one goes on: {error}");
+        }
+        self.refused = Some(Refused { spec: least, when: Instant::now(), reason: error.to_string() });
+        Err(())
     }
 
-    fn publish(&mut self, snapshot: &Snapshot) -> Result<(), ProtocolError> {
-        self.make_room(snapshot)?;
+    fn publish(&mut self, snapshot: &Snapshot, notice: &str) -> Result<(), ProtocolError> {
         let frame = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls.records,
             changed: None,
@@ -171,7 +208,7 @@ impl PublisherActor {
             lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
             scene_text: &snapshot.still.scene_text,
-            notice: &snapshot.still.notice,
+            notice,
             config_generation: snapshot.still.config_generation,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;

@@ -20,8 +20,6 @@ pub(super) enum News {
     Scene(Box<Scene>),
     /// It is no scene: why, with file, line and column.
     Broken(String),
-    /// It is again what is being simulated.
-    Restored,
 }
 
 /// So long nothing must happen before the file is read.
@@ -35,7 +33,7 @@ const LOOK: Duration = Duration::from_millis(500);
 /// A file that is not there for so many looks is gone, and not being replaced.
 const GONE_AFTER: u32 = 2;
 
-/// Watches until `stop` is closed. `loaded` is the scene as it was loaded at the start.
+/// Watches until `stop` is closed. `loaded` is the scene as it was loaded at the start; what was saved since is news.
 pub(super) fn start(
     source: ConfigSource,
     loaded: &Scene,
@@ -44,15 +42,13 @@ pub(super) fn start(
 ) -> Result<std::thread::JoinHandle<()>, SimulatorError> {
     let (tell, told) = flume::bounded(1);
     let watch = Watch {
-        files: config_source::assets(loaded),
+        files: loaded.files.to_vec(),
         watcher: watcher(tell),
         watched: false,
         told,
-        good: None,
-        tried: None,
+        tried: source.text().map(str::to_owned),
         seen: Fingerprint::default(),
-        good_hash: loaded.hash,
-        is_broken: false,
+        told_last: Told::Scene(loaded.hash),
         missing: 0,
         source,
     };
@@ -78,14 +74,20 @@ struct Watch {
     watcher: Option<RecommendedWatcher>,
     watched: bool,
     told: flume::Receiver<()>,
-    /// The text of the scene that is simulated; `None` until it was read here.
-    good: Option<String>,
     /// The text that was tried last.
     tried: Option<String>,
     seen: Fingerprint,
-    good_hash: u64,
-    is_broken: bool,
+    told_last: Told,
     missing: u32,
+}
+
+/// What was told last.
+#[derive(Clone, Debug, PartialEq)]
+enum Told {
+    /// A scene of this hash.
+    Scene(u64),
+    /// That there is none, and why.
+    Broken(String),
 }
 
 /// Sizes and times of the config and its assets.
@@ -100,11 +102,10 @@ enum Heard {
 
 impl Watch {
     fn run(mut self, news: &flume::Sender<News>, stop: &flume::Receiver<()>) {
-        self.seen = self.fingerprint();
-        // What was loaded, if nobody has saved since.
-        self.good = read(&self.source.path).ok();
-        self.tried.clone_from(&self.good);
         self.listen();
+        // Somebody may have saved the config while the scene was made ready.
+        self.seen = self.fingerprint();
+        self.seen.0[0] = None;
         loop {
             let was_told = match self.hear(LOOK, stop) {
                 Heard::Stop => return,
@@ -131,7 +132,8 @@ impl Watch {
             {
                 return;
             }
-            self.seen = if is_missing { Fingerprint::default() } else { now };
+            // A scene has its own files: they are looked at from now on.
+            self.seen = if is_missing { Fingerprint::default() } else { self.fingerprint() };
         }
     }
 
@@ -181,38 +183,44 @@ impl Watch {
         let text = match read_twice(&self.source.path) {
             Ok(text) if text.trim().is_empty() => return None,
             Ok(text) => text,
-            Err(_) if !is_gone => return None,
+            // It is being replaced, until it is gone for longer.
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !is_gone => return None,
             Err(error) => {
                 self.tried = None;
-                self.is_broken = true;
                 let path = self.source.path.display();
-                return Some(News::Broken(format!("{path}: cannot be read ({error}); restore it")));
+                return self.tell_broken(format!("{path}: cannot be read ({error}); restore it"));
             }
         };
         if self.tried.as_ref() == Some(&text) && !assets_changed {
             return None;
         }
-        self.tried = Some(text.clone());
-        if self.good.as_ref() == Some(&text) && !assets_changed {
-            return std::mem::take(&mut self.is_broken).then_some(News::Restored);
-        }
-        match self.source.load_text(&text) {
+        let loaded = self.source.load_text(&text);
+        self.tried = Some(text);
+        match loaded {
             Ok(scene) => {
-                let is_same = scene.hash == self.good_hash;
-                (self.good, self.good_hash) = (Some(text), scene.hash);
-                let was_broken = std::mem::take(&mut self.is_broken);
-                if is_same {
-                    return was_broken.then_some(News::Restored);
+                if *scene.files != *self.files {
+                    self.files = scene.files.to_vec();
+                    self.watched = false;
                 }
-                self.files = config_source::assets(&scene);
-                self.watched = false;
-                Some(News::Scene(Box::new(scene)))
+                match std::mem::replace(&mut self.told_last, Told::Scene(scene.hash)) {
+                    Told::Scene(hash) if hash == scene.hash => None,
+                    _ => Some(News::Scene(Box::new(scene))),
+                }
             }
             Err(error) => {
-                self.is_broken = true;
-                Some(News::Broken(error.to_string()))
+                // A file that it waits for is looked for, too.
+                let missing = config_source::missing(&error);
+                self.files.extend(missing.into_iter().filter(|file| !file.as_os_str().is_empty()));
+                self.files.dedup();
+                self.watched = false;
+                self.tell_broken(error.to_string())
             }
         }
+    }
+
+    fn tell_broken(&mut self, reason: String) -> Option<News> {
+        let told = Told::Broken(reason.clone());
+        (std::mem::replace(&mut self.told_last, told.clone()) != told).then_some(News::Broken(reason))
     }
 }
 

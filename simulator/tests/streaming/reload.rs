@@ -53,7 +53,7 @@ fn start(name: &str) -> Edited {
     fs::create_dir(folder.path().join("scenes")).unwrap();
     let path = folder.path().join("scenes/room.toml");
     write(&path, &text(0.0, 80, 0.8));
-    let source = ConfigSource { path: path.clone(), overrides: Default::default() };
+    let mut source = ConfigSource::new(&path, Default::default());
     let simulation = Simulation::new(Arc::new(source.load().unwrap()));
     let options = Options { threads: Some(2), config: Some(source), ..Options::default() };
     let service = start_with(name, &simulation, options);

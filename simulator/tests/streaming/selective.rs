@@ -154,10 +154,7 @@ fn what_a_change_does_not_concern_is_not_traced_again() {
     assert!(stale > slots / 20 && stale < slots / 2, "{stale} of {slots}");
     assert!(savings.retraced_paths == u64::from(stale) && savings.rays_saved > u64::from(slots - stale));
     let (recoloured, _) = stale_after(&|room| room.albedo = 0.2);
-    assert!(
-        recoloured > slots / 20 && recoloured < slots / 2,
-        "{recoloured} touched ball or crate"
-    );
+    assert!(recoloured > slots / 20 && recoloured < slots / 2, "{recoloured} touched ball or crate");
     assert_eq!(stale_after(&|room| room.vsls = 57).0, 0);
     assert_eq!(stale_after(&|room| room.power = 9.0).0, 0);
     assert_eq!(stale_after(&|room| room.shelf = true).0, stale_after(&|room| room.shelf = true).0);
