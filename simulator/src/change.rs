@@ -2,6 +2,7 @@
 
 use crate::{
     disturbance::{Disturbance, Obstacle},
+    emitters::LightSlots,
     encounters::Encounters,
     pool::PathPool,
     simulation::Simulation,
@@ -24,6 +25,23 @@ pub struct LightRevision {
 impl LightRevision {
     /// Nothing to do.
     pub const NONE: Self = Self { stale: false, factor: Vec3::ONE };
+
+    /// What another weight of a light's paths means for them; with `is_elsewhere` they are stale in any case.
+    pub(crate) fn of_slots(old: &LightSlots, new: &LightSlots, is_elsewhere: bool) -> Self {
+        let watts = if old.watts_per_power == new.watts_per_power {
+            1.0
+        } else {
+            old.watts_per_power / new.watts_per_power
+        };
+        let ratio = |old: f32, new: f32| match (old, new) {
+            (old, new) if old == new => 1.0,
+            (0.0, _) => 0.0,
+            (old, new) => new / old,
+        };
+        let [r, g, b] = [0, 1, 2].map(|i| ratio(old.birth[i], new.birth[i]));
+        let factor = Vec3::new(r, g, b) * if watts.is_finite() { watts } else { 0.0 };
+        Self { stale: is_elsewhere || old.birth != new.birth, factor }
+    }
 }
 
 /// What a new version of the scene means for the paths of the old one.
@@ -96,22 +114,10 @@ fn light_revisions(old: &Simulation, new: &Simulation) -> Vec<LightRevision> {
     lights
         .zip(slots)
         .map(|((old, new), (old_slots, new_slots))| {
-            let weighed_anew = old_slots.birth != new_slots.birth;
             // The beam of a sun covers the whole scene.
             let is_sun = matches!(new.light.shape, LightShape::Directional { .. });
             let is_elsewhere = old.light.shape != new.light.shape || (is_sun && has_other_bounds);
-            let watts = if old_slots.watts_per_power == new_slots.watts_per_power {
-                1.0
-            } else {
-                old_slots.watts_per_power / new_slots.watts_per_power
-            };
-            let ratio = |old: f32, new: f32| match (old, new) {
-                (old, new) if old == new => 1.0,
-                (0.0, _) => 0.0,
-                (old, new) => new / old,
-            };
-            let [r, g, b] = [0, 1, 2].map(|i| ratio(old_slots.birth[i], new_slots.birth[i]));
-            LightRevision { stale: is_elsewhere || weighed_anew, factor: Vec3::new(r, g, b) * watts }
+            LightRevision::of_slots(old_slots, new_slots, is_elsewhere)
         })
         .collect()
 }

@@ -145,6 +145,14 @@ impl VslFlux {
         }
     }
 
+    /// Adds the first column of `other` to one of these.
+    pub(crate) fn merge(&mut self, column: u32, other: &Self) {
+        let start = column as usize * self.vsls;
+        for (cell, more) in self.cells[start..start + self.vsls].iter_mut().zip(other.column(0)) {
+            *cell = *cell + *more;
+        }
+    }
+
     /// Makes a column empty.
     pub(crate) fn clear(&mut self, column: u32) {
         let start = column as usize * self.vsls;

@@ -56,46 +56,13 @@ impl Migration {
                     || (is_sun && before.bounds != after.bounds)
                     // Of a stream later samples are numbered by the light's slots.
                     || (count(&old_slots.slots) != count(&slots.slots) && !matches!(after.streaming.sampling, photonstream_scene::Sampling::Replay));
-                let is_alone = |simulation: &Simulation, column: u32| {
-                    simulation.emitters.columns[column as usize].shared_watts.is_none()
-                };
-                let both_alone = is_alone(old, old_slots.column) && is_alone(new, slots.column);
-                // Watts that a path stands for, times the paths: units of shared columns differ.
-                let factor = if both_alone && old_slots.watts_per_power == slots.watts_per_power {
-                    Vec3::ONE
-                } else {
-                    unit_factor(old, index, new, light.light.power, slots)
-                };
-                Some((index, LightRevision { stale: all_stale || is_moved || factor != Vec3::ONE, factor }))
+                let revision = LightRevision::of_slots(old_slots, slots, all_stale || is_moved);
+                Some((index, revision))
             })
             .collect();
         let same_owners = old.placement == new.placement && triangles.iter().zip(0..).all(|(&t, i)| t == i);
         Self { lights, triangles, disturbance, same_owners }
     }
-}
-
-/// What old deposits of a light are multiplied by so that they stand for the same light, about, in the new scene's units.
-fn unit_factor(
-    old: &Simulation,
-    index: usize,
-    new: &Simulation,
-    power: Vec3,
-    slots: &crate::emitters::LightSlots,
-) -> Vec3 {
-    let unit = |simulation: &Simulation, slots: &crate::emitters::LightSlots, power: Vec3| {
-        let column = &simulation.emitters.columns[slots.column as usize];
-        let own = f64::from(slots.slots.end - slots.slots.start) / f64::from(column.slots.max(1));
-        let watts = column.shared_watts.map_or(power * slots.watts_per_power, Vec3::splat);
-        // A deposit of throughput 1 counts so many watts, as one of the column's paths.
-        watts * own as f32
-    };
-    let old_slots = &old.emitters.lights[index];
-    let (before, after) =
-        (unit(old, old_slots, old.scene.lights[index].light.power), unit(new, slots, power));
-    let ratio = |before: f32, after: f32| {
-        if after > 0.0 && before.is_finite() { (before / after).min(1e6) } else { 0.0 }
-    };
-    Vec3::new(ratio(before.x, after.x), ratio(before.y, after.y), ratio(before.z, after.z))
 }
 
 /// Where each old triangle is now, and what has changed on the way of paths.
@@ -149,7 +116,9 @@ fn stands_alike(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bo
 impl Ledger {
     /// The ledger of another scene, with the paths of this one that `migration` leaves. Tasks under way are dropped when
     /// they come.
-    pub fn migrate(self, migration: &Migration, simulation: &Simulation) -> Self {
+    ///
+    /// `budget` is that of [`Ledger::revise`].
+    pub fn migrate(self, migration: &Migration, simulation: &Simulation, budget: Option<u32>) -> Self {
         let mut next = simulation.ledger();
         next.version = self.version + 1;
         next.structure = self.structure + 1;
@@ -184,6 +153,9 @@ impl Ledger {
                     next.given[slot as usize] = self.given.get(old_slot as usize).copied().unwrap_or(1);
                 }
             }
+        }
+        if let Some(budget) = budget {
+            next.fit_open(budget);
         }
         next.queue_open_slots();
         next

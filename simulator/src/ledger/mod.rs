@@ -16,7 +16,7 @@ pub use migration::Migration;
 use crate::{
     change::Change,
     counters::Counters,
-    emitters::Emitters,
+    emitters::{Emitters, LightSlots},
     flux::{ColumnScale, FluxReading},
     pool::PathPool,
     simulation::Simulation,
@@ -174,14 +174,15 @@ impl Ledger {
                 self.refinement.reset(light.column as usize, self.version);
             }
         }
+        let concerned: Vec<bool> = (0..change.lights.len()).map(|light| change.may_concern(light)).collect();
         if needs_rays {
             if let Some(budget) = budget {
-                self.fit(budget, &change, |ledger| ledger.estimate(&change));
+                self.fit(budget, &concerned, |ledger| ledger.estimate(&change));
             }
             self.make_stale(&change);
         }
         if let Some(budget) = budget {
-            self.fit(budget, &change, |ledger| f64::from(ledger.empty + ledger.stale_paths));
+            self.fit(budget, &concerned, Self::open_slots);
         }
         if !self.under_way.is_empty() {
             self.changes.push_back((self.version, Arc::new(change)));
@@ -235,8 +236,20 @@ impl Ledger {
         }
     }
 
-    /// Takes slots out of use until no more than `budget` of those that `count` says have to be traced.
-    fn fit(&mut self, budget: u32, change: &Change, count: impl Fn(&Self) -> f64) {
+    fn open_slots(&self) -> f64 {
+        f64::from(self.empty + self.stale_paths)
+    }
+
+    /// As [`Ledger::fit`], of all lights that have slots to be traced.
+    fn fit_open(&mut self, budget: u32) {
+        let is_open = |slot: u32| self.slots[slot as usize] & (FILLED | STALE) != FILLED;
+        let lights = self.emitters.lights.iter();
+        let concerned: Vec<bool> = lights.map(|light| light.slots.clone().any(is_open)).collect();
+        self.fit(budget, &concerned, Self::open_slots);
+    }
+
+    /// Takes slots of the lights that are `concerned` out of use until no more than `budget` of those that `count` says have to be traced.
+    fn fit(&mut self, budget: u32, concerned: &[bool], count: impl Fn(&Self) -> f64) {
         // The first slots of a light may have more than their share of them.
         let mut before = u32::MAX;
         while self.active_slots() < before {
@@ -245,17 +258,17 @@ impl Ledger {
                 return;
             }
             before = self.active_slots();
-            self.shrink(f64::from(budget) / open, change);
+            self.shrink(f64::from(budget) / open, concerned);
         }
     }
 
-    /// Leaves a share of the slots of each light in use that `change` may concern.
-    fn shrink(&mut self, share: f64, change: &Change) {
+    /// Leaves a share of the slots of each light in use that is `concerned`.
+    fn shrink(&mut self, share: f64, concerned: &[bool]) {
         for index in 0..self.active.len() {
             let light = &self.emitters.lights[index];
             let column = &self.emitters.columns[light.column as usize];
             // In a shared column a path's weight is that of its light's share of the slots.
-            if column.shared_watts.is_some() || !change.may_concern(index) {
+            if column.shared_watts.is_some() || !concerned[index] {
                 continue;
             }
             let slots = light.slots.start..light.slots.start + self.active[index];
@@ -322,13 +335,13 @@ impl Ledger {
         if let Some(task) = self.next_open_task(false) {
             return Some(task);
         }
-        if self.sampling == Sampling::Fresh {
-            return self.next_of_ring();
-        }
         let is_settled = self.empty == 0 && self.stale_paths == 0 && self.queue.is_empty();
         if is_settled && !self.is_full() {
             self.grow();
             return self.next_open_task(false);
+        }
+        if self.sampling == Sampling::Fresh {
+            return self.next_of_ring();
         }
         if !is_settled {
             return None;
@@ -356,10 +369,11 @@ impl Ledger {
     /// The next task of a stream of fresh samples: of the light that is behind, its oldest paths.
     fn next_of_ring(&mut self) -> Option<Task> {
         let lights = &self.emitters.lights;
-        let progress = |i: usize| self.rings[i].progress(lights[i].slots.end - lights[i].slots.start);
+        let progress = |i: usize| self.rings[i].progress(self.active[i]);
         let light =
             (0..lights.len()).reduce(|best, i| if progress(i) < progress(best) { i } else { best })?;
-        let slots = lights[light].slots.clone();
+        let first = lights[light].slots.start;
+        let slots = first..first + self.active[light];
         let marks = &self.slots;
         let taken =
             self.rings[light].take(slots, PATHS_PER_TASK, |slot| marks[slot as usize] & UNDER_WAY == 0);
@@ -528,11 +542,31 @@ impl Ledger {
     fn scales_of(&self, watts: &[Vec3]) -> Vec<ColumnScale> {
         let columns = watts.iter().zip(self.pool.valid()).enumerate();
         columns
-            .map(|(column, (&watts, &paths))| ColumnScale {
-                watts,
-                paths: paths + self.refinement.paths(column),
+            .map(|(column, (&watts, &valid))| {
+                let paths = self.paths_of(column, valid) + self.refinement.paths(column);
+                ColumnScale { watts, paths }
             })
             .collect()
+    }
+
+    /// The number of paths by which the deposits of a column are divided, of which `valid` are in the pool.
+    ///
+    /// In a shared column the paths of a light stand for its share of the slots: where one light has more of its slots
+    /// filled than another, that is counted as if all had, so that none carries the light of another. What is missing
+    /// of the others is dark until it is traced.
+    fn paths_of(&self, column: usize, valid: u32) -> u32 {
+        let column = &self.emitters.columns[column];
+        if column.shared_watts.is_none() || valid == column.slots || valid == 0 {
+            return valid;
+        }
+        let lights = &self.emitters.lights[column.lights.start as usize..column.lights.end as usize];
+        let share = |light: &LightSlots| {
+            let marks = &self.slots[light.slots.start as usize..light.slots.end as usize];
+            let filled = marks.iter().filter(|&&mark| mark & FILLED != 0).count();
+            filled as f64 / marks.len().max(1) as f64
+        };
+        let most = lights.iter().map(share).fold(0.0, f64::max);
+        ((most * f64::from(column.slots)).round() as u32).max(1)
     }
 
     /// The flux of every virtual surface light with the lights' present powers, in their order.

@@ -109,6 +109,10 @@ impl Ring {
         is_free: impl Fn(u32) -> bool,
     ) -> Vec<u32> {
         let count = slots.end - slots.start;
+        // The light may have fewer slots in use than before.
+        if self.next >= count {
+            self.next = 0;
+        }
         let mut taken = Vec::new();
         while (taken.len() as u32) < most.min(count) && is_free(slots.start + self.next) {
             taken.push(slots.start + self.next);

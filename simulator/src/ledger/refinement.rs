@@ -21,6 +21,9 @@ pub(super) struct Refinement {
     /// Relative standard error at which it ends; 0: none at all.
     pub(super) target: f64,
     flux: VslFlux,
+    /// The present round, until it is whole: lights of one column are traced one after another.
+    of_round: VslFlux,
+    paths_of_round: u32,
     columns: Vec<ColumnState>,
     /// The rest of the present round.
     round: VecDeque<Range<u32>>,
@@ -48,6 +51,8 @@ impl Refinement {
         Self {
             target,
             flux: VslFlux::new(if target > 0.0 { vsls } else { 0 }, columns),
+            of_round: VslFlux::new(if target > 0.0 { vsls } else { 0 }, 1),
+            paths_of_round: 0,
             columns: vec![ColumnState::default(); columns],
             round: VecDeque::new(),
             round_column: 0,
@@ -81,6 +86,7 @@ impl Refinement {
         *state = ColumnState { valid_since: version, ..ColumnState::default() };
         if self.round_column == column {
             self.round.clear();
+            self.forget_round();
         }
         self.error = None;
     }
@@ -156,11 +162,22 @@ impl Refinement {
     /// Takes in a finished batch of `column`, traced in `version`.
     pub(super) fn apply(&mut self, column: usize, version: u64, batch: &PathBatch, birth_ms: u32) {
         self.under_way -= 1;
-        let state = &mut self.columns[column];
-        if version < state.valid_since {
+        if version < self.columns[column].valid_since {
             return;
         }
-        state.paths += batch.slots.len() as u32;
-        self.flux.add(column as u32, &batch.deposits, birth_ms);
+        self.paths_of_round += batch.slots.len() as u32;
+        self.of_round.add(0, &batch.deposits, birth_ms);
+        if self.round.is_empty() && self.under_way == 0 {
+            self.flux.merge(column as u32, &self.of_round);
+            self.columns[column].paths += self.paths_of_round;
+            self.forget_round();
+        }
+    }
+
+    fn forget_round(&mut self) {
+        if self.paths_of_round > 0 {
+            self.of_round.clear(0);
+            self.paths_of_round = 0;
+        }
     }
 }

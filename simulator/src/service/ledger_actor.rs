@@ -424,7 +424,8 @@ impl Progress {
             let migration = Migration::between(&self.simulation, &simulation);
             // Its place is taken at once.
             let old = std::mem::replace(&mut self.ledger, simulation.ledger());
-            self.ledger = old.migrate(&migration, &simulation);
+            let budget = self.budget(&simulation);
+            self.ledger = old.migrate(&migration, &simulation, budget);
         }
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;
