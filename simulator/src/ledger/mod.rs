@@ -264,11 +264,11 @@ impl Ledger {
 
     /// Leaves a share of the slots of each light in use that is `concerned`.
     fn shrink(&mut self, share: f64, concerned: &[bool]) {
-        for index in 0..self.active.len() {
+        for (index, &is_concerned) in concerned.iter().enumerate() {
             let light = &self.emitters.lights[index];
             let column = &self.emitters.columns[light.column as usize];
             // In a shared column a path's weight is that of its light's share of the slots.
-            if column.shared_watts.is_some() || !concerned[index] {
+            if column.shared_watts.is_some() || !is_concerned {
                 continue;
             }
             let slots = light.slots.start..light.slots.start + self.active[index];

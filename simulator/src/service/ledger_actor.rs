@@ -23,7 +23,7 @@ use std::{
 /// What reaches the ledger.
 pub(super) enum ToLedger {
     /// A tracer has finished a task.
-    Finished { task: Task, batch: PathBatch },
+    Finished(Box<(Task, PathBatch)>),
     /// Change what is done; the answer is the number of the first frame that shows it.
     Change(Change, flume::Sender<u64>),
     /// Go on in a new version of the scene; the answer is the number of the first frame that shows it.
@@ -279,7 +279,8 @@ impl LedgerActor {
     /// False where it is time to end.
     fn handle(&self, message: ToLedger, progress: &mut Progress) -> bool {
         match message {
-            ToLedger::Finished { task, batch } => {
+            ToLedger::Finished(finished) => {
+                let (task, batch) = *finished;
                 let birth_ms = progress.now_ms();
                 progress.traced_ns = monotonic_ns();
                 progress.spare.extend(progress.ledger.apply(task, batch, birth_ms));

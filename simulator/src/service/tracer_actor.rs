@@ -19,7 +19,7 @@ pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>
     let mut wave = Wave::default();
     while let Ok(Work { tracer, task, mut batch }) = work.recv() {
         tracer.trace(&task.draws, &mut wave, &mut batch);
-        if ledger.send(ToLedger::Finished { task, batch }).is_err() {
+        if ledger.send(ToLedger::Finished(Box::new((task, batch)))).is_err() {
             return;
         }
     }
