@@ -233,7 +233,11 @@ fn moved_objects_are_followed() {
     assert_eq!(depth_after(0.0, "back").1.unwrap(), still);
     let (output, _) = depth_after(5e9, "beyond");
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("object.sphere.world_from_loaded: found a vertex"), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("object.sphere.world_from_loaded: found a vertex"),
+        "{}",
+        stderr(&output)
+    );
 }
 
 const CHILD: &str = "PHOTONSTREAM_TEST_SIMULATOR";

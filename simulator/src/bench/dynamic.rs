@@ -295,6 +295,8 @@ struct Follower {
 }
 
 const PATIENCE: Duration = Duration::from_secs(120);
+/// Rest before each change: longer than the time between frames.
+const BETWEEN: Duration = Duration::from_millis(60);
 
 impl Follower {
     fn start(simulation: &Simulation) -> Result<Self, SimulatorError> {
@@ -333,6 +335,8 @@ impl Follower {
         let mut before = frames_until(&mut subscriber, |frame| frame.statistics.converged == 1)?.pop();
         let mut all: Vec<[f64; 7]> = Vec::new();
         for round in 0..rounds {
+            // The wait for a frame after the last one is not that of this change.
+            std::thread::sleep(BETWEEN);
             let arrived = before.as_ref().map_or(0, |frame| frame.statistics.edit_received_ns);
             let is_new = |frame: &VslFrame| frame.statistics.edit_received_ns > arrived;
             // Frames are looked for while the request is still under way: the first may come before the reply.
