@@ -50,7 +50,8 @@ impl Default for DynamicOptions {
 pub struct EventFigures {
     /// What was changed.
     pub event: String,
-    /// From its arrival to the first frame that shows it, ms.
+    /// From its arrival to the publication of the first frame of it that a reader saw, ms; the reader shares the cores
+    /// with the tracers.
     pub first_frame_ms: f64,
     /// To 95 % of the way to the converged light, ms.
     pub t95_ms: f64,
