@@ -49,11 +49,12 @@ pub struct Written<'a> {
 /// the simulator closes the channel, or `cancelled` is set.
 ///
 /// A simulator that dies leaves its last frame; the renderer waits for the next one and follows it. With `--frames`,
-/// once the light has converged and no newer frame comes, the remaining pictures repeat the last one.
+/// once the light has converged and no newer frame comes, the remaining pictures repeat the last one. A scene that
+/// cannot be loaded (an asset is being written) is told, and tried again; the last picture stays until then.
 ///
 /// # Errors
-/// [`RenderError`]: an option out of range, a scene that cannot be loaded, a file that cannot be written, a channel
-/// that is insecure or of another release.
+/// [`RenderError`]: an option out of range, a scene that cannot be loaded before there is any picture, a file that
+/// cannot be written, a channel that is insecure or of another release.
 pub fn run(
     args: &Args,
     renderer: &mut dyn FrameRenderer,
@@ -61,47 +62,11 @@ pub fn run(
     written: &mut dyn FnMut(&Written<'_>),
 ) -> Result<Report, RenderError> {
     let stop = || cancelled.load(Ordering::Relaxed);
-    let mut run =
-        Run { args, renderer, cancelled, written, scene: PublishedScene::default(), pictures: 0, last: None };
+    let mut run = Run::new(args, renderer, cancelled, written);
     let Some(mut subscriber) = attach(args, &stop)? else { return Ok(run.report(Ended::Cancelled)) };
-    let mut told = None;
-    let mut noticed = String::new();
-    let mut pending = false;
-    let mut newest = Instant::now();
     loop {
-        if stop() {
-            return Ok(run.report(Ended::Cancelled));
-        }
-        // Asked before reading: what was published before the channel was closed is then read.
-        let liveness = subscriber.liveness();
-        match subscriber.read() {
-            Ok(Reading::New) => {
-                (pending, newest) = (true, Instant::now());
-                tell_notice(&mut noticed, args, subscriber.frame().map_or("", |frame| &frame.notice));
-            }
-            Ok(_) => {}
-            Err(error) => tell(&mut told, format!("{error}; the last frame is kept")),
-        }
-        tell_liveness(&mut told, args, &liveness);
-        let closed = liveness == Liveness::Retired;
-        if let Some(frame) = subscriber.frame() {
-            let converged = frame.statistics.converged != 0;
-            let due = if args.frames.is_some() { pending } else { converged || closed };
-            if due {
-                match run.picture(frame) {
-                    Err(RenderError::Cancelled) => return Ok(run.report(Ended::Cancelled)),
-                    result => result?,
-                }
-                pending = false;
-            } else if run.last.is_some() && converged && newest.elapsed() > QUIET {
-                run.repeat()?;
-            }
-        }
-        if run.pictures >= args.frames.unwrap_or(1) {
-            return Ok(run.report(Ended::Done));
-        }
-        if closed {
-            return Ok(run.report(Ended::ChannelClosed));
+        if let Some(ended) = run.turn(&mut subscriber)? {
+            return Ok(run.report(ended));
         }
         subscriber.wait(Duration::from_millis(100));
     }
@@ -109,6 +74,8 @@ pub fn run(
 
 /// So long without a newer frame, a converged light is taken to be at rest.
 const QUIET: Duration = Duration::from_millis(500);
+/// Time between two attempts to load a scene that cannot be loaded.
+const TRY_AGAIN: Duration = Duration::from_millis(200);
 
 fn attach(args: &Args, stop: &dyn Fn() -> bool) -> Result<Option<Subscriber>, RenderError> {
     match Subscriber::attach(&args.channel, AccessMode::Mapped) {
@@ -172,6 +139,15 @@ struct Run<'a> {
     scene: PublishedScene,
     pictures: u32,
     last: Option<Last>,
+    /// What was last said of the channel, of the simulation, and of the scene.
+    told: Option<String>,
+    noticed: String,
+    refused: Option<String>,
+    /// A frame has been read and not been shown.
+    pending: bool,
+    newest: Instant,
+    /// Not before then a refused scene is tried again.
+    try_again: Instant,
 }
 
 /// The last picture.
@@ -181,16 +157,93 @@ struct Last {
     settings: RenderSettings,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    fn new(
+        args: &'a Args,
+        renderer: &'a mut dyn FrameRenderer,
+        cancelled: &'a AtomicBool,
+        written: &'a mut dyn FnMut(&Written<'_>),
+    ) -> Self {
+        let now = Instant::now();
+        Self {
+            args,
+            renderer,
+            cancelled,
+            written,
+            scene: PublishedScene::default(),
+            pictures: 0,
+            last: None,
+            told: None,
+            noticed: String::new(),
+            refused: None,
+            pending: false,
+            newest: now,
+            try_again: now,
+        }
+    }
+
     fn report(&self, ended: Ended) -> Report {
         Report { pictures: self.pictures, last_frame: self.last.as_ref().map(|l| l.frame), ended }
     }
 
+    /// Looks at the channel once and writes a picture if one is due; why the run is over, if it is.
+    fn turn(&mut self, subscriber: &mut Subscriber) -> Result<Option<Ended>, RenderError> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Ok(Some(Ended::Cancelled));
+        }
+        // Asked before reading: what was published before the channel was closed is then read.
+        let liveness = subscriber.liveness();
+        match subscriber.read() {
+            Ok(Reading::New) => {
+                (self.pending, self.newest) = (true, Instant::now());
+                let notice = subscriber.frame().map_or("", |frame| &frame.notice);
+                tell_notice(&mut self.noticed, self.args, notice);
+            }
+            Ok(_) => {}
+            Err(error) => tell(&mut self.told, format!("{error}; the last frame is kept")),
+        }
+        tell_liveness(&mut self.told, self.args, &liveness);
+        let closed = liveness == Liveness::Retired;
+        if let Some(frame) = subscriber.frame() {
+            let converged = frame.statistics.converged != 0;
+            let due = if self.args.frames.is_some() { self.pending } else { converged || closed };
+            let rests = self.refused.is_some() && Instant::now() < self.try_again && !closed;
+            if due && rests {
+                // The last picture stays, and is not repeated either.
+            } else if due {
+                match self.picture(frame) {
+                    Err(RenderError::Cancelled) => return Ok(Some(Ended::Cancelled)),
+                    result => result?,
+                }
+            } else if self.last.is_some() && converged && self.newest.elapsed() > QUIET {
+                self.repeat()?;
+            }
+        }
+        if self.pictures >= self.args.frames.unwrap_or(1) {
+            return Ok(Some(Ended::Done));
+        }
+        Ok(closed.then_some(Ended::ChannelClosed))
+    }
+
+    /// Writes a picture of `frame`, which stays pending where its scene cannot be had for now.
     fn picture(&mut self, frame: &VslFrame) -> Result<(), RenderError> {
-        let scene = self.scene.update(frame)?;
+        let scene = match self.scene.update(frame) {
+            Ok(scene) => scene,
+            Err(error) if self.last.is_some() => {
+                let channel = &self.args.channel;
+                tell(&mut self.refused, format!("channel {channel}: {error}; keeping the last picture"));
+                self.try_again = Instant::now() + TRY_AGAIN;
+                return Ok(());
+            }
+            Err(error) => return Err(error),
+        };
+        if self.refused.take().is_some() {
+            tracing::info!("channel {}: the published scene can be shown again", self.args.channel);
+        }
         let watch = Watch { progress: None, cancelled: Some(self.cancelled) };
         let rendered = self.renderer.render(scene, frame, &self.args.options(&scene.render), watch)?;
         let settings = scene.render.clone();
+        self.pending = false;
         self.write(Last { frame: frame.frame, rendered, settings })
     }
 
@@ -229,3 +282,6 @@ fn write_files(
     }
     Ok(files)
 }
+
+#[cfg(test)]
+mod tests;

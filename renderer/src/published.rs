@@ -7,11 +7,19 @@ use photonstream_scene::{MaterialId, ObjectId, Scene};
 use photonstream_shading::{Light, LightShape};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// The scene of the last frame; its text is parsed again only when it changes.
+/// The scene of the last frame that could be shown; it is loaded again only when its text or its assets change.
 #[derive(Debug, Default)]
 pub struct PublishedScene {
-    text: Option<Arc<str>>,
-    scene: Option<Scene>,
+    loaded: Option<Loaded>,
+}
+
+/// A scene, and what it was loaded for.
+#[derive(Debug)]
+struct Loaded {
+    text: Arc<str>,
+    /// Of the text and of what the assets held when the simulator read them.
+    hash: u64,
+    scene: Scene,
 }
 
 impl PublishedScene {
@@ -20,20 +28,25 @@ impl PublishedScene {
     /// built anew; what did not stays shared.
     ///
     /// # Errors
-    /// [`RenderError::Scene`] for a text that cannot be loaded or does not fit the records, [`RenderError::Light`],
-    /// [`RenderError::Object`] for a place or a reflectance that cannot be. The scene stays that of the last good frame, unless the
-    /// text is another one.
+    /// [`RenderError::Scene`] for a text that cannot be loaded or does not fit the records, as while an asset is being
+    /// written; [`RenderError::Light`], [`RenderError::Object`] for a place or a reflectance that cannot be. The scene
+    /// stays that of the last good frame; a later call looks at the files again.
     pub fn update(&mut self, frame: &VslFrame) -> Result<&Scene, RenderError> {
-        let is_same = |text: &Arc<str>| Arc::ptr_eq(text, &frame.scene_text) || *text == frame.scene_text;
-        let is_known = self.scene.is_some() && self.text.as_ref().is_some_and(is_same);
-        if !is_known {
-            self.scene = None;
-            let scene = Scene::from_resolved(&frame.scene_text)
-                .map_err(|e| RenderError::Scene { reason: e.to_string() })?;
-            self.text = Some(Arc::clone(&frame.scene_text));
-            self.scene = Some(scene);
-        }
-        let scene = self.scene.as_mut().expect("invariant: set above");
+        let is_of = |loaded: &&mut Loaded| {
+            let is_same_text =
+                Arc::ptr_eq(&loaded.text, &frame.scene_text) || loaded.text == frame.scene_text;
+            is_same_text && loaded.hash == frame.scene_hash
+        };
+        let mut new = None;
+        let scene = match self.loaded.as_mut().filter(is_of) {
+            Some(loaded) => &mut loaded.scene,
+            None => {
+                let scene = Scene::from_resolved(&frame.scene_text)
+                    .map_err(|e| RenderError::Scene { reason: e.to_string() })?;
+                let (text, hash) = (Arc::clone(&frame.scene_text), frame.scene_hash);
+                &mut new.insert(Loaded { text, hash, scene }).scene
+            }
+        };
         let lights = lights(scene, &frame.lights)?;
         let albedos = albedos(scene, &frame.objects)?;
         place_objects(scene, &frame.objects)?;
@@ -41,13 +54,22 @@ impl PublishedScene {
             scene.materials[id as usize].albedo = albedo;
         }
         put_lights(scene, lights);
-        Ok(scene)
+        if new.is_some() {
+            self.loaded = new;
+        }
+        Ok(&self.loaded.as_ref().expect("invariant: found or set above").scene)
     }
 }
 
 /// The reflectances that the records have for their objects' materials, each material once.
 fn albedos(scene: &Scene, records: &[ObjectRecord]) -> Result<BTreeMap<MaterialId, Vec3>, RenderError> {
     let mut found: BTreeMap<MaterialId, Vec3> = BTreeMap::new();
+    // Without records all is as the text says.
+    if !records.is_empty() && records.len() != scene.objects.len() {
+        let reason =
+            format!("{} objects are published, text and assets have {}", records.len(), scene.objects.len());
+        return Err(RenderError::Scene { reason });
+    }
     for record in records {
         let Some(object) = scene.objects.get(record.id as usize) else {
             let count = scene.objects.len();
@@ -165,19 +187,19 @@ fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use glam::DVec3;
 
-    const ROOM: &str = "[camera]\nposition_m = [0, 0, 3]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n\
+    pub(crate) const ROOM: &str = "[camera]\nposition_m = [0, 0, 3]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n\
          [material.a]\nalbedo = 0.5\n\
          [object.ball]\nmaterial = \"a\"\nsphere = { radius_m = 0.5, segments = 8 }\n\
          [object.floor]\nmaterial = \"a\"\nquad = { corner_m = [-1, -1, 1], edge_u_m = [2, 0, 0], edge_v_m = [0, 0, -2] }\n\
          [light.lamp]\npower_w = 3\nrectangle = { corner_m = [0, 1, 0], edge_u_m = [0.5, 0, 0], edge_v_m = [0, 0, 0.5] }\n";
 
     /// A frame of `scene` as a simulator publishes it.
-    fn frame(scene: &Scene) -> VslFrame {
+    pub(crate) fn frame(scene: &Scene) -> VslFrame {
         let objects = (0u32..).take(scene.objects.len()).map(|id| ObjectRecord {
             id,
             world_from_object: scene.world_from_loaded(ObjectId(id)).to_cols_array(),
@@ -201,6 +223,7 @@ mod tests {
             objects: objects.collect(),
             lights: lights.collect(),
             scene_text: Arc::clone(&scene.resolved_text),
+            scene_hash: scene.hash,
             ..VslFrame::default()
         }
     }
@@ -287,6 +310,41 @@ mod tests {
             last = found;
         }
         assert_eq!((&last.geometry, &last.objects), (&first.geometry, &first.objects));
+    }
+
+    /// An OBJ is edited, cut short and made whole again under one text: each time with another hash its content is
+    /// loaded, where that cannot be the last good scene stays, and what is loaded is not looked for on disk again.
+    #[test]
+    fn edited_assets_are_loaded_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("roof.obj");
+        let write = |height: u32, end: &str| {
+            std::fs::write(&path, format!("v 0 {height} 0\nv 1 {height} 0\nv 0 {height} 1\n{end}")).unwrap();
+        };
+        let text = format!(
+            "origin_m = [0, 0, 0]\n{ROOM}[object.roof]\nmaterial = \"a\"\nobj = {{ path = {path:?} }}\n"
+        );
+        write(1, "f 1 2 3\n");
+        let low = Scene::from_resolved(&text).unwrap();
+        write(2, "f 1 2 3\n");
+        let high = Scene::from_resolved(&text).unwrap();
+        assert!(low.resolved_text == high.resolved_text && low.hash != high.hash);
+        write(1, "f 1 2 3\n");
+        let mut published = PublishedScene::default();
+        assert_eq!(published.update(&frame(&low)).unwrap().geometry, low.geometry);
+        for (end, part) in [("f 1 2 4\n", "roof.obj"), ("f 1 2 3\ng b\nf 3 2 1\n", "objects are published")] {
+            write(2, end);
+            let error = published.update(&frame(&high)).unwrap_err().to_string();
+            assert!(
+                error.starts_with("the published scene cannot be loaded") && error.contains(part),
+                "{error}"
+            );
+            assert_eq!(published.update(&frame(&low)).unwrap().geometry, low.geometry);
+        }
+        write(2, "f 1 2 3\n");
+        assert_eq!(published.update(&frame(&high)).unwrap().geometry, high.geometry);
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(published.update(&frame(&high)).unwrap().geometry, high.geometry);
     }
 
     #[test]
