@@ -79,9 +79,12 @@ impl FrameWords {
             let record = kind.record_bytes() / 8;
             let step = CHUNK_RECORDS * record;
             let &[records, changed] = take(&mut words, 2)? else { return Err("no array".into()) };
-            // A frame fits into a record of the file.
-            let records = usize::try_from(records).ok().filter(|records| *records <= 1 << 26);
-            let length = records.ok_or("more records than can be")? * record;
+            // Each word that was not there before is among those that follow: no file demands more memory than it fills.
+            let most = array.len() + words.len();
+            let length = usize::try_from(records).ok().and_then(|records| records.checked_mul(record));
+            let length = length
+                .filter(|length| *length <= most)
+                .ok_or_else(|| format!("{records} {} records in {most} words", kind.name()))?;
             array.resize(length, 0);
             let chunks = take(&mut words, usize::try_from(changed).unwrap_or(usize::MAX))?;
             for &c in chunks {
@@ -199,5 +202,21 @@ mod tests {
         }
         out.push(0);
         assert!(FrameWords::default().decode(&out).is_err());
+    }
+
+    /// As many records as the words that follow could hold are taken for possible, one more is not, and nothing is
+    /// allocated for it.
+    #[test]
+    fn records_without_words_are_refused() {
+        let mut head = vec![0; HEAD];
+        let record = ArrayKind::ALL[0].record_bytes() / 8;
+        for records in [1, 1 << 26, u64::MAX / record as u64 + 2] {
+            head.truncate(HEAD);
+            head.extend([records, 0]);
+            let mut words = FrameWords::default();
+            let error = words.decode(&head).unwrap_err();
+            assert!(error.starts_with(&format!("{records} vsl records in 0 words")), "{error}");
+            assert_eq!(words.arrays[0].capacity(), 0);
+        }
     }
 }
