@@ -204,8 +204,7 @@ mod tests {
         assert!(FrameWords::default().decode(&out).is_err());
     }
 
-    /// As many records as the words that follow could hold are taken for possible, one more is not, and nothing is
-    /// allocated for it.
+    /// More records than there are words for are refused before anything is allocated.
     #[test]
     fn records_without_words_are_refused() {
         let mut head = vec![0; HEAD];

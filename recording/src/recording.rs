@@ -169,3 +169,30 @@ impl Recording {
         RecordingError::Io { action, path: self.path.clone(), source }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::file_header;
+
+    /// A file of fewer than 200 bytes with right checksums that speaks of 2²⁶ virtual surface lights (17 GB for the arrays) is damaged, and
+    /// nothing is allocated for them.
+    #[test]
+    fn a_small_file_demands_little_memory() {
+        let mut raw = vec![0u64; 8];
+        for _ in 0..6 {
+            raw.extend([1 << 26, 0]);
+        }
+        let payload = lz4_flex::block::compress(bytemuck::cast_slice(&raw));
+        let header = RecordHeader::new(RecordKind::Whole, 1, raw.len() as u64 * 8, &payload);
+        let file = [&file_header()[..], &header.to_bytes(), &payload].concat();
+        assert!(file.len() < 200, "{}", file.len());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("small");
+        std::fs::write(&path, file).unwrap();
+        let mut recording = Recording::open(&path).unwrap();
+        let error = recording.next_frame().unwrap_err();
+        assert!(matches!(error, RecordingError::Damaged { frame: 1, .. }), "{error}");
+        assert!(error.to_string().contains("67108864 vsl records in 10 words"), "{error}");
+    }
+}
