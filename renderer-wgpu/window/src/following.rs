@@ -12,11 +12,13 @@ use std::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// Longest sleep of the thread before it looks whether it shall end.
 const LOOK: Duration = Duration::from_millis(50);
+/// Time between two attempts to load a scene that cannot be loaded.
+const TRY_AGAIN: Duration = Duration::from_millis(200);
 
 /// A published frame and the scene it was computed for.
 #[derive(Clone, Debug)]
@@ -91,6 +93,7 @@ impl Following {
             wake,
             scene: PublishedScene::default(),
             known: None,
+            refused: None,
         };
         std::thread::Builder::new()
             .name("following".into())
@@ -133,6 +136,8 @@ impl Drop for Following {
 /// The scene of the last frame, and what it was made of.
 struct Known {
     text: Arc<str>,
+    /// Of the text and its assets.
+    hash: u64,
     lights: Vec<LightRecord>,
     objects: Vec<ObjectRecord>,
     scene: Arc<Scene>,
@@ -145,6 +150,8 @@ struct Follower<W> {
     wake: W,
     scene: PublishedScene,
     known: Option<Known>,
+    /// When the scene of the newest frame could not be had.
+    refused: Option<Instant>,
 }
 
 impl<W: Fn()> Follower<W> {
@@ -192,18 +199,18 @@ impl<W: Fn()> Follower<W> {
     }
 
     fn read(&mut self, subscriber: &mut Subscriber) -> Result<Option<Published>, RenderError> {
-        match subscriber.read()? {
-            Reading::New => {}
-            Reading::Unchanged | Reading::Busy | Reading::Empty => return Ok(None),
-        }
-        let Some(frame) = subscriber.frame() else { return Ok(None) };
+        let is_new = subscriber.read()? == Reading::New;
+        // A file that could not be loaded may be whole by now, also where no other frame comes.
+        let is_due = self.refused.map_or(is_new, |refused| refused.elapsed() >= TRY_AGAIN);
+        let Some(frame) = subscriber.frame().filter(|_| is_due) else { return Ok(None) };
+        let is_of = |known: &Known| known.text == frame.scene_text && known.hash == frame.scene_hash;
         let is_known = self.known.as_ref().is_some_and(|known| {
-            known.text == frame.scene_text && known.lights == frame.lights && known.objects == frame.objects
+            is_of(known) && known.lights == frame.lights && known.objects == frame.objects
         });
         if !is_known {
-            let known = self.known.take().filter(|known| known.text == frame.scene_text);
-            let scene = Arc::new(self.scene.update(frame)?.clone());
-            let standing = match known {
+            let scene = self.scene.update(frame).inspect_err(|_| self.refused = Some(Instant::now()));
+            let scene = Arc::new(scene?.clone());
+            let standing = match self.known.take().filter(is_of) {
                 Some(known) => known.standing,
                 None => Arc::new(
                     Scene::from_resolved(&frame.scene_text)
@@ -213,12 +220,14 @@ impl<W: Fn()> Follower<W> {
             };
             self.known = Some(Known {
                 text: Arc::clone(&frame.scene_text),
+                hash: frame.scene_hash,
                 lights: frame.lights.clone(),
                 objects: frame.objects.clone(),
                 scene,
                 standing,
             });
         }
+        self.refused = None;
         let known = self.known.as_ref().expect("invariant: set above");
         let (scene, standing) = (Arc::clone(&known.scene), Arc::clone(&known.standing));
         Ok(Some(Published { frame: Arc::new(frame.clone()), scene, standing }))
@@ -233,3 +242,6 @@ fn rounded(liveness: Liveness) -> Liveness {
         other => other,
     }
 }
+
+#[cfg(test)]
+mod tests;
