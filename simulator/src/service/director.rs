@@ -305,6 +305,7 @@ impl Director {
                         self.show(scene, monotonic_ns())
                     }
                     Err(SettingsError::Value(error)) => Reply::error(edits::code(&error), error.to_string()),
+                    Err(error @ SettingsError::Threads) => Reply::error("invalid-value", error.to_string()),
                     Err(error) => Reply::error("unknown-key", error.to_string()),
                 }
             }

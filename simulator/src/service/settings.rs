@@ -10,6 +10,9 @@ pub(super) enum SettingsError {
     /// No such key, or not of its type.
     #[error("streaming: {0}; the keys are those of the config's [streaming] table")]
     Keys(#[from] serde_json::Error),
+    /// Threads are started once.
+    #[error("streaming.threads: found a new number, expected none while it runs; restart the simulation")]
+    Threads,
     /// A value is not possible.
     #[error(transparent)]
     Value(#[from] SceneError),
@@ -17,6 +20,9 @@ pub(super) enum SettingsError {
 
 /// `scene` with other settings; its lights and objects stay as edits have made them.
 pub(super) fn with_settings(scene: &Scene, values: &Map<String, Value>) -> Result<Scene, SettingsError> {
+    if values.contains_key("threads") {
+        return Err(SettingsError::Threads);
+    }
     let mut config = SceneConfig::from_text(&scene.resolved_text, Path::new(""))?;
     let mut settings = serde_json::to_value(&config.streaming)?;
     if let Value::Object(settings) = &mut settings {

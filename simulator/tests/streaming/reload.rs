@@ -202,6 +202,7 @@ fn settings_change_while_light_goes_on() {
         (json!({ "vsl": 5 }), "unknown-key", "vsl"),
         (json!({ "vsls": "many" }), "unknown-key", "expected u32"),
         (json!({ "vsls": 0 }), "invalid-value", "vsls"),
+        (json!({ "threads": 3 }), "invalid-value", "restart"),
     ] {
         let Reply::Error { code: found, message } = set(keys) else { panic!() };
         assert!(found == code && message.contains(part), "{found}: {message}");
