@@ -12,6 +12,8 @@ use std::{
 
 /// Longest sleep before it is looked whether to stop.
 const LOOK: Duration = Duration::from_millis(50);
+/// Least time between the beginnings of two rounds: one frame has no time of its own, nor have frames at once.
+const ROUND: Duration = Duration::from_millis(20);
 
 /// How a recording is played.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +73,7 @@ impl Player<'_> {
     pub(crate) fn play(&mut self) -> Result<Ending, LauncherError> {
         self.playback.publisher().set_paused(self.is_paused);
         let mut due = Instant::now();
+        let (mut round, mut begun) = (self.rounds, due);
         let mut time_ns = self.show(None)?;
         loop {
             let is_there = self.fetch();
@@ -79,6 +82,10 @@ impl Player<'_> {
                 // A frame of an earlier time is the first one of another round.
                 let pause = Duration::from_nanos(recorded_ns.saturating_sub(time_ns)).as_secs_f64();
                 due += Duration::try_from_secs_f64(pause / self.manner.speed).unwrap_or(FOREVER).min(FOREVER);
+                if self.rounds != round {
+                    due = due.max(begun + ROUND);
+                    (round, begun) = (self.rounds, due.max(Instant::now()));
+                }
             } else if !self.manner.holds {
                 return Ok(Ending::End);
             }
