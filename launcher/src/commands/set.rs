@@ -16,7 +16,7 @@ use std::{
 #[command(after_help = "\
 KEY is light.NAME.…, object.NAME.…, material.NAME.… or streaming.…, as in the config; NAME may contain / and be in quotes.
 VALUE is TOML. Several keys of one thing change together, in one frame. A config file is not written to.
---wait waits without end where the light never converges (sampling \"fresh\", things that move): Ctrl-C.
+--wait waits without end where the light never converges (things that move): Ctrl-C.
 
 Examples:
   photonstream set --channel demo light.lamp.power_w=[80,60,40] object.ball.position_m=[0,1,0]
