@@ -31,10 +31,19 @@ pub(crate) struct Limits {
 pub(crate) struct Taken {
     pub(crate) file: PathBuf,
     pub(crate) frames: u64,
-    /// Frames that were published and gone before they could be read.
+    /// Frames that were published and gone before they could be read, since the first one recorded or wanted.
     pub(crate) skipped_frames: u64,
     pub(crate) bytes: u64,
     pub(crate) seconds: f64,
+}
+
+/// Where a recording begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Beginning {
+    /// With the first frame that was published: others before the first one read are skipped ones.
+    First,
+    /// With the frame that is there.
+    Present,
 }
 
 /// Records until a limit, the end of the channel, or `stop`; a simulator that is started again is followed.
@@ -45,11 +54,13 @@ pub(crate) fn take(
     file: &Path,
     mut recorder: Recorder,
     subscriber: &mut Subscriber,
+    beginning: Beginning,
     limits: Limits,
     stop: &AtomicBool,
 ) -> Result<Taken, LauncherError> {
     let begun = Instant::now();
-    let (mut last, mut skipped_frames) = (None, 0);
+    let mut last = (beginning == Beginning::First).then_some(0);
+    let (mut publisher, mut skipped_frames) = (subscriber.publisher_pid(), 0);
     loop {
         // Asked before reading: what was published before the end is then read.
         let is_over = stop.load(Ordering::Relaxed) || subscriber.liveness() == Liveness::Retired;
@@ -57,6 +68,10 @@ pub(crate) fn take(
         let is_new = reading == Reading::New || (last.is_none() && subscriber.frame().is_some());
         if let (true, Some(frame)) = (is_new, subscriber.frame()) {
             recorder.write(frame)?;
+            if std::mem::replace(&mut publisher, subscriber.publisher_pid()) != publisher {
+                // A simulator that is started again counts from 1.
+                last = Some(0);
+            }
             skipped_frames += last.map_or(0, |last| frame.frame.saturating_sub(last + 1));
             last = Some(frame.frame);
         }
@@ -91,7 +106,7 @@ impl Background {
         let (file, channel, flag) = (file.to_owned(), channel.clone(), Arc::clone(&stop));
         let record = move || {
             let Some(mut subscriber) = attach(&channel, &flag)? else { return Ok(None) };
-            take(&file, recorder, &mut subscriber, Limits::default(), &flag).map(Some)
+            take(&file, recorder, &mut subscriber, Beginning::First, Limits::default(), &flag).map(Some)
         };
         let thread = std::thread::Builder::new().name("recording".into()).spawn(record);
         let thread = thread.map_err(|e| LauncherError::io("start the thread of", "the recording", e))?;
@@ -108,10 +123,15 @@ impl Background {
     }
 }
 
+/// Attaches once a publisher lives there: what a crash has left on the channel is not of this run.
 fn attach(channel: &ChannelName, stop: &AtomicBool) -> Result<Option<Subscriber>, LauncherError> {
     loop {
         match Subscriber::attach(channel, AccessMode::Mapped) {
-            Ok(subscriber) => return Ok(Some(subscriber)),
+            Ok(subscriber) => {
+                if !matches!(subscriber.liveness(), Liveness::Gone { .. } | Liveness::Retired) {
+                    return Ok(Some(subscriber));
+                }
+            }
             Err(ProtocolError::NotCreated { .. } | ProtocolError::NotInitialised { .. }) => {}
             Err(error) => return Err(error.into()),
         }

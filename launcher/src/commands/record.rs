@@ -6,7 +6,7 @@ use crate::{
     follow,
     output::{self, grouped},
     signals::Listener,
-    taking::{self, Limits, Taken},
+    taking::{self, Beginning, Limits, Taken},
 };
 use photonstream_protocol::ChannelName;
 use photonstream_recording::Recorder;
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let mut subscriber = follow::present_frame(&args.channel)?;
     let recorder = Recorder::create(&args.out)?;
     let limits = Limits { frames: args.frames, time: args.seconds.map(Duration::from_secs_f64) };
-    let taken = taking::take(&args.out, recorder, &mut subscriber, limits, &stop)?;
+    let taken = taking::take(&args.out, recorder, &mut subscriber, Beginning::Present, limits, &stop)?;
     output::report(global.json, &taken, text)
 }
 

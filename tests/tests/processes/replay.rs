@@ -3,6 +3,7 @@
 use crate::harness::{Ground, config, files, has_keys, wait_for};
 use photonstream_film::Film;
 use photonstream_protocol::{AccessMode, ControlClient, Liveness, Reply, Request, Runtime, Subscriber};
+use photonstream_recording::Recording;
 use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::{fs, io::Write, process::Stdio, time::Duration};
@@ -153,6 +154,50 @@ fn a_run_is_recorded_and_stepped_through() {
     let report: Value = serde_json::from_str(&said.stdout).unwrap();
     assert_eq!(report["shown_frames"], frames);
     assert!(report["damage"].as_str().unwrap().contains(&length.to_string()));
+}
+
+/// A simulation of 20 lights is killed; a run of 50 lights on its channel records its own frames alone, and knows how many
+/// it has missed. One frame of it in a loop: a round takes 20 ms at least, however fast it is to be.
+#[test]
+fn a_run_after_a_crash_records_its_own_frames() {
+    let ground = Ground::new();
+    let scene = config("cornell-box.toml");
+    let small = ["--channel", "again", "--pool", "512"];
+    let dead = ground.start(&[&["simulate", &scene, "--vsls", "20"], &small[..]].concat());
+    let runtime = Runtime::at(ground.runtime());
+    wait_for("a frame", || {
+        let channel = "again".parse().unwrap();
+        let mut subscriber = Subscriber::attach_in(&runtime, &channel, AccessMode::Mapped).ok()?;
+        subscriber.read().ok()?;
+        subscriber.frame().map(drop)
+    });
+    dead.signal(Signal::KILL);
+    assert!(!dead.wait().status.success());
+    let line = "--headless --frames 2 --vsls 50 --size 8x8 --visibility none --record own.photons --json";
+    let arguments = ["run", &scene].into_iter().chain(line.split(' ')).chain(small).collect::<Vec<_>>();
+    let taken = &ground.json(&arguments)["recording"];
+    let mut recording = Recording::open(&ground.path("own.photons")).unwrap();
+    let mut numbers = Vec::new();
+    while let Some(frame) = recording.next_frame().unwrap() {
+        assert!(frame.vsls.len() > 20, "{} lights", frame.vsls.len());
+        numbers.push(frame.frame);
+    }
+    assert!(numbers.is_sorted_by(|a, b| a < b), "{numbers:?}");
+    let skipped = numbers.last().unwrap() - numbers.len() as u64;
+    assert_eq!((&taken["frames"], &taken["skipped_frames"]), (&json!(numbers.len()), &json!(skipped)));
+
+    let line = "replay own.photons --channel round --frames 1 --loop --speed 1e6 --json";
+    let replay = ground.start(&line.split(' ').collect::<Vec<_>>());
+    let mut client = connect(&ground, "round");
+    wait_for("ten rounds", || match client.request(&Request::Query, PATIENCE).unwrap() {
+        Reply::State { state } => (state["shown"].as_u64()? > 10).then_some(()),
+        other => panic!("{other:?}"),
+    });
+    client.request(&Request::Shutdown, PATIENCE).unwrap();
+    let report: Value = serde_json::from_str(&replay.wait().stdout).unwrap();
+    let (rounds, seconds) = (report["rounds"].as_f64().unwrap(), report["total_s"].as_f64().unwrap());
+    // The round that was about to begin counts, too.
+    assert!(rounds >= 10.0 && (rounds - 1.0) * 0.02 <= seconds, "{report}");
 }
 
 #[test]
