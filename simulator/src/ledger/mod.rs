@@ -9,15 +9,16 @@
 
 mod migration;
 mod queue;
+mod reading;
 mod refinement;
+mod slots_in_use;
 
 pub use migration::Migration;
 
 use crate::{
     change::Change,
     counters::Counters,
-    emitters::{Emitters, LightSlots},
-    flux::{ColumnScale, FluxReading},
+    emitters::Emitters,
     pool::PathPool,
     simulation::Simulation,
     tracer::{Draw, PathBatch},
@@ -34,9 +35,6 @@ use std::{
 
 /// Paths in one task: enough to make handing it over cheap, few enough to share the work evenly.
 pub const PATHS_PER_TASK: u32 = 512;
-
-/// A light's part of the pool is never made smaller than this for the sake of speed.
-const LEAST_ACTIVE: u32 = 256;
 
 /// Slots to be traced.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,9 +58,6 @@ pub struct Savings {
     /// Paths that such changes made stale.
     pub retraced_paths: u64,
 }
-
-/// Paths of a light from which it is guessed how many of all are concerned.
-const LOOKED_AT: u32 = 1024;
 
 /// Paths in one unit of parallel work when all are looked through.
 const PATHS_LOOKED_AT: usize = 8192;
@@ -190,22 +185,6 @@ impl Ledger {
         self.queue_open_slots();
     }
 
-    /// About how many paths would have to be traced after `change`, from the first of each light.
-    fn estimate(&self, change: &Change) -> f64 {
-        let mut open = 0.0;
-        for (index, light) in self.emitters.lights.iter().enumerate() {
-            let count = self.active[index].min(LOOKED_AT);
-            let slots = light.slots.start..light.slots.start + count;
-            let is_open = |slot: &u32| {
-                self.slots[*slot as usize] & (FILLED | STALE) != FILLED
-                    || change.concerns(index, self.pool.trail(*slot).unwrap_or_default())
-            };
-            let share = slots.filter(is_open).count() as f64 / f64::from(count.max(1));
-            open += share * f64::from(self.active[index]);
-        }
-        open
-    }
-
     /// Marks the paths that `change` concerns.
     fn make_stale(&mut self, change: &Change) {
         let concerned = change.look_through(&self.pool);
@@ -234,75 +213,6 @@ impl Ledger {
             self.savings.retraced_paths += u64::from(found.stale);
             self.savings.rays_saved += found.kept_rays;
         }
-    }
-
-    fn open_slots(&self) -> f64 {
-        f64::from(self.empty + self.stale_paths)
-    }
-
-    /// As [`Ledger::fit`], of all lights that have slots to be traced.
-    fn fit_open(&mut self, budget: u32) {
-        let is_open = |slot: u32| self.slots[slot as usize] & (FILLED | STALE) != FILLED;
-        let lights = self.emitters.lights.iter();
-        let concerned: Vec<bool> = lights.map(|light| light.slots.clone().any(is_open)).collect();
-        self.fit(budget, &concerned, Self::open_slots);
-    }
-
-    /// Takes slots of the lights that are `concerned` out of use until no more than `budget` of those that `count` says have to be traced.
-    fn fit(&mut self, budget: u32, concerned: &[bool], count: impl Fn(&Self) -> f64) {
-        // The first slots of a light may have more than their share of them.
-        let mut before = u32::MAX;
-        while self.active_slots() < before {
-            let open = count(self);
-            if open <= f64::from(budget) {
-                return;
-            }
-            before = self.active_slots();
-            self.shrink(f64::from(budget) / open, concerned);
-        }
-    }
-
-    /// Leaves a share of the slots of each light in use that is `concerned`.
-    fn shrink(&mut self, share: f64, concerned: &[bool]) {
-        for (index, &is_concerned) in concerned.iter().enumerate() {
-            let light = &self.emitters.lights[index];
-            let column = &self.emitters.columns[light.column as usize];
-            // In a shared column a path's weight is that of its light's share of the slots.
-            if column.shared_watts.is_some() || !is_concerned {
-                continue;
-            }
-            let slots = light.slots.start..light.slots.start + self.active[index];
-            let fewer = (f64::from(self.active[index]) * share) as u32;
-            let fewer = fewer.max(LEAST_ACTIVE).min(self.active[index]);
-            for mark in &mut self.slots[(slots.start + fewer) as usize..slots.end as usize] {
-                self.empty -= u32::from(*mark & FILLED == 0);
-                self.stale_paths -= u32::from(*mark & STALE != 0);
-                *mark &= UNDER_WAY;
-            }
-            self.refinement.reset(light.column as usize, self.version);
-            self.pool.truncate(slots, fewer);
-            self.active[index] = fewer;
-        }
-    }
-
-    /// Takes twice as many slots into use, as far as there are.
-    fn grow(&mut self) {
-        for (index, active) in self.active.iter_mut().enumerate() {
-            let slots = &self.emitters.lights[index].slots;
-            let more = active.saturating_mul(2).min(slots.end - slots.start);
-            self.empty += more - *active;
-            *active = more;
-        }
-        self.queue_open_slots();
-    }
-
-    /// Whether all slots are in use.
-    pub fn is_full(&self) -> bool {
-        self.emitters
-            .lights
-            .iter()
-            .zip(&self.active)
-            .all(|(l, &active)| l.slots.end - l.slots.start == active)
     }
 
     fn queue_open_slots(&mut self) {
@@ -528,51 +438,5 @@ impl Ledger {
     /// What has happened so far.
     pub fn counters(&self) -> Counters {
         self.counters
-    }
-
-    /// What a unit of each column stands for with the lights' present powers.
-    pub fn scales(&self, scene: &Scene) -> Vec<ColumnScale> {
-        self.scales_of(&self.emitters.column_watts(scene))
-    }
-
-    fn all_scales(&self) -> Vec<ColumnScale> {
-        self.scales_of(&self.watts)
-    }
-
-    fn scales_of(&self, watts: &[Vec3]) -> Vec<ColumnScale> {
-        let columns = watts.iter().zip(self.pool.valid()).enumerate();
-        columns
-            .map(|(column, (&watts, &valid))| {
-                let paths = self.paths_of(column, valid) + self.refinement.paths(column);
-                ColumnScale { watts, paths }
-            })
-            .collect()
-    }
-
-    /// The number of paths by which the deposits of a column are divided, of which `valid` are in the pool.
-    ///
-    /// In a shared column the paths of a light stand for its share of the slots: where one light has more of its slots
-    /// filled than another, that is counted as if all had, so that none carries the light of another. What is missing
-    /// of the others is dark until it is traced.
-    fn paths_of(&self, column: usize, valid: u32) -> u32 {
-        let column = &self.emitters.columns[column];
-        if column.shared_watts.is_none() || valid == column.slots || valid == 0 {
-            return valid;
-        }
-        let lights = &self.emitters.lights[column.lights.start as usize..column.lights.end as usize];
-        let share = |light: &LightSlots| {
-            let marks = &self.slots[light.slots.start as usize..light.slots.end as usize];
-            let filled = marks.iter().filter(|&&mark| mark & FILLED != 0).count();
-            filled as f64 / marks.len().max(1) as f64
-        };
-        let most = lights.iter().map(share).fold(0.0, f64::max);
-        ((most * f64::from(column.slots)).round() as u32).max(1)
-    }
-
-    /// The flux of every virtual surface light with the lights' present powers, in their order.
-    pub fn readings(&self, scene: &Scene) -> impl Iterator<Item = FluxReading> {
-        let scales = self.scales(scene);
-        let (flux, more) = (self.pool.flux(), self.refinement.flux());
-        (0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales))
     }
 }

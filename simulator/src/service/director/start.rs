@@ -1,0 +1,129 @@
+//! Turns a simulation into actors that run, joined by channels.
+
+use super::{Director, Options, publish_period};
+use crate::{
+    error::SimulatorError,
+    records,
+    service::{
+        Farewell,
+        clock::Clock,
+        ledger_actor::LedgerActor,
+        publisher_actor::{PlacedRecords, PublisherActor, RECORD_SETS, Still},
+        spawn, tracer_actor, watcher,
+    },
+    simulation::Simulation,
+};
+use crossbeam::queue::ArrayQueue;
+use photonstream_protocol::{ControlServer, Publisher};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64},
+    },
+    time::Instant,
+};
+
+impl Director {
+    pub(super) fn start(simulation: Simulation, options: &Options) -> Result<Self, SimulatorError> {
+        let scene = Arc::clone(&simulation.scene);
+        let threads = options
+            .threads
+            .or(scene.streaming.threads.map(|t| t as usize))
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+            .max(1);
+        let place = records::vsl_records(&scene, &simulation.placement);
+        let place = PlacedRecords { records: place, version: 0, placement: 0 };
+        let still = Arc::new(Still::new(&scene));
+        let spec = still.spec(place.records.len(), None);
+        let publisher = Publisher::create(&options.channel, &spec)?;
+        let server = ControlServer::start(&publisher)?;
+
+        let (work_sender, work) = flume::bounded(2 * threads + 2);
+        let (to_ledger, inbox) = flume::bounded(4 * threads + 16);
+        let (snapshot_sender, snapshots) = flume::bounded(1);
+        let emptied = Arc::new(ArrayQueue::new(RECORD_SETS));
+        for records in std::iter::repeat_n(place, RECORD_SETS) {
+            emptied.push(records).expect("invariant: the queue has room for all sets of records");
+        }
+        // At most one message for each version, which this thread makes.
+        let (settled_sender, settled) = flume::unbounded();
+        let (farewells, actor_gone) = flume::bounded(1);
+        let tracers = (0..threads)
+            .map(|_| {
+                let (work, to_ledger, farewell) =
+                    (work.clone(), to_ledger.clone(), Farewell(farewells.clone()));
+                spawn("tracer", move || {
+                    let _farewell = farewell;
+                    tracer_actor::run(&work, &to_ledger);
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        let latest_frame = Arc::new(AtomicU64::new(0));
+        let orderly = Arc::new(AtomicBool::new(false));
+        let actor = PublisherActor {
+            publisher,
+            snapshots,
+            emptied: Arc::clone(&emptied),
+            latest_frame: Arc::clone(&latest_frame),
+            orderly: Arc::clone(&orderly),
+            refused: None,
+        };
+        let publisher = {
+            let farewell = Farewell(farewells.clone());
+            spawn("publisher", move || {
+                let _farewell = farewell;
+                actor.run()
+            })?
+        };
+        let actor = LedgerActor {
+            simulation: simulation.clone(),
+            still: Arc::clone(&still),
+            threads,
+            inbox,
+            work: work_sender,
+            snapshots: snapshot_sender,
+            emptied,
+            after_paths: options.after_paths,
+            only_whole: scene.streaming.fixed_step_ms.is_some() && !scene.animation.is_empty(),
+            settled: settled_sender,
+        };
+        let ledger = {
+            let farewell = Farewell(farewells.clone());
+            spawn("ledger", move || {
+                let _farewell = farewell;
+                actor.run()
+            })?
+        };
+        let (tell, news) = flume::bounded(1);
+        let watching = match &options.config {
+            Some(source) => {
+                let (stop, stopped) = flume::bounded(1);
+                Some((stop, watcher::start(source.clone(), &scene, tell, stopped)?))
+            }
+            None => None,
+        };
+        let period = publish_period(&scene);
+        Ok(Self {
+            scene_name: scene.name.clone(),
+            clock: Clock::new(scene.streaming.fixed_step_ms, period),
+            config: options.config.clone(),
+            loaded_hash: scene.hash,
+            animation_error: String::new(),
+            news,
+            watching,
+            settled,
+            versions: 0,
+            simulation,
+            still,
+            started: Instant::now(),
+            server,
+            to_ledger,
+            latest_frame,
+            orderly,
+            ledger,
+            actor_gone,
+            publisher,
+            tracers,
+        })
+    }
+}
