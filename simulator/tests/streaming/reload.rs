@@ -222,3 +222,34 @@ fn settings_change_while_light_goes_on() {
     assert_eq!(edited.subscriber.frame().unwrap().frame, refined.frame);
     edited.end();
 }
+
+/// What cannot be read is told, a file that a config waits for is waited for, and an edited mesh or material library is
+/// simulated, though the config's text is the same.
+#[test]
+fn files_that_a_config_names_are_watched_too() {
+    let mut edited = start("assets");
+    let (path, folder) = (edited.path.clone(), edited.path.parent().unwrap().to_owned());
+    fs::write(&path, [b'#', 0xFF, b'\n']).unwrap();
+    edited.wait_for_notice("cannot be read");
+    let mesh = "[object.mesh]\nposition_m = [0, -0.6, 0]\nobj = { path = \"mesh.obj\" }\n";
+    let with_mesh = text(0.0, 80, 0.8).replace("[light.bulb]", &format!("{mesh}[light.bulb]"));
+    write(&path, &with_mesh);
+    edited.wait_for_notice("mesh.obj");
+    let plate = |size: f64| {
+        format!(
+            "mtllib mesh.mtl\nusemtl m\nv {0} 0 {0}\nv {0} 0 -{0}\nv -{0} 0 -{0}\nv -{0} 0 {0}\nf 1 2 3\nf 1 3 4\n",
+            size
+        )
+    };
+    write(&folder.join("mesh.mtl"), "newmtl m\nKd 0.5 0.5 0.5\n");
+    write(&folder.join("mesh.obj"), &plate(0.3));
+    let first = edited.wait_for(&with_mesh);
+    assert!(first.notice.is_empty());
+    write(&folder.join("mesh.obj"), &plate(0.5));
+    let larger = edited.wait_for(&with_mesh);
+    assert_eq!(larger.config_generation, first.config_generation + 1);
+    write(&folder.join("mesh.mtl"), "newmtl m\nKd 0.9 0.1 0.1\n");
+    let red = edited.wait_for(&with_mesh);
+    assert!(red.config_generation == larger.config_generation + 1 && red.scene_hash != larger.scene_hash);
+    edited.end();
+}
