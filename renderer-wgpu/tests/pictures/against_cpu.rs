@@ -113,12 +113,15 @@ fn near_shadow_edges(
     (0..visible.len()).map(is_near).collect()
 }
 
-/// With shadow maps the picture differs from the CPU's ray-traced one on shadow edges only: at most 2 % of the pixels
-/// are off by more than 5 %, and where direct light is, there is a shadow's edge or a crease within two pixels, which are
-/// some texels of the map. 160 × 120 pixels. The area light has 16 points of its own on both sides, of which the CPU draws others for each pixel: it is given 256, so
-/// that its noise stays below the limit.
+/// With shadow maps at most 2 % of the pixels are off the CPU's ray-traced picture by more than 5 %, and where direct light
+/// is, they lie within two pixels of a shadow's edge or of a crease. 160 × 120 pixels.
+///
+/// The creases are a flaw of the maps, not of the comparison: GPU and CPU agree there by rays. Of the pixels that are off,
+/// those near creases and no visible shadow edge were 0 of 20 (point), 5 of 43 (spot), 13 of 41 (wide spot), 81 of 151 (sun)
+/// and 0 of 265 (area). The area light has 16 points of its own on both sides, of which the CPU draws others for each
+/// pixel: it is given 256, so that its noise stays below the limit.
 #[test]
-fn shadow_maps_differ_on_shadow_edges_only() {
+fn shadow_maps_differ_on_shadow_edges_and_creases() {
     for (name, lamp) in LAMPS {
         let lit = scenes::cornell(lamp, "vsls = 100\npool_paths = 4096");
         let Some(mut renderer) = lit.renderer() else { return };

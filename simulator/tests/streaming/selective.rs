@@ -107,7 +107,7 @@ fn assert_is_traced_anew(ledger: &Ledger, simulation: &Simulation, what: &str) {
 /// and a shared one; 1 and 4 threads. Exact: no tolerance.
 #[test]
 fn a_thousand_changes_end_in_the_light_of_a_full_trace() {
-    for (columns, threads) in [(8, 4), (2, 1)] {
+    for (columns, threads) in [(8, 1), (8, 4), (2, 1), (2, 4)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut room = Room { columns, ..first() };
