@@ -2,6 +2,7 @@
 //! and whoever embeds the simulator.
 
 use crate::{
+    cancel::Cancel,
     emitters::{Emitters, LightSlots},
     ledger::{Ledger, PATHS_PER_TASK},
     owner::OwnerTable,
@@ -30,19 +31,23 @@ pub struct Simulation {
 impl Simulation {
     /// Places virtual surface lights on `scene` and prepares everything else; the same on any number of threads.
     pub fn new(scene: Arc<Scene>) -> Self {
-        let mut placement = Placement::new(&scene);
-        let owners = Arc::new(OwnerTable::new(&scene, &placement));
+        Self::new_unless(scene, &Cancel::default()).expect("invariant: nobody else can cancel it")
+    }
+
+    /// [`Simulation::new`], or `None` soon after it was cancelled.
+    pub fn new_unless(scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
+        let mut placement = Placement::new_unless(&scene, cancel)?;
+        let owners = Arc::new(OwnerTable::new_unless(&scene, &placement, cancel)?);
         placement.measure_areas(&scene, &owners);
         let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
-        Self { scene, placement: Arc::new(placement), owners, emitters, tracer }
+        cancel.or(Self { scene, placement: Arc::new(placement), owners, emitters, tracer })
     }
 
     /// Whether the virtual surface lights of `scene` are those of this simulation: a version of its scene in which no
     /// object has another mesh, with the same settings.
     pub fn has_lights_of(&self, scene: &Scene) -> bool {
-        Arc::ptr_eq(&self.scene.geometry.rest_vertices, &scene.geometry.rest_vertices)
-            && self.scene.streaming == scene.streaming
+        have_same_lights(&self.scene, scene)
     }
 
     /// The same simulation in an edited version of its scene: the virtual surface lights ride with their objects, and the
@@ -62,7 +67,12 @@ impl Simulation {
     /// Another scene in the place of this one, with lights placed anew. Where the lights and the size of the pool are the
     /// same, the pool is split as before, so that no path is lost to another power.
     pub fn reloaded(&self, scene: Arc<Scene>) -> Self {
-        let mut next = Self::new(scene);
+        self.reloaded_unless(scene, &Cancel::default()).expect("invariant: nobody else can cancel it")
+    }
+
+    /// [`Simulation::reloaded`], or `None` soon after it was cancelled.
+    pub fn reloaded_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
+        let mut next = Self::new_unless(scene, cancel)?;
         let names = |scene: &Scene| scene.lights.iter().map(|light| light.name.clone()).collect::<Vec<_>>();
         let (old, new) = (&self.scene, &next.scene);
         if names(old) == names(new) && old.streaming.pool_paths == new.streaming.pool_paths {
@@ -70,7 +80,7 @@ impl Simulation {
             next.tracer = Tracer::new(Arc::clone(new), Arc::clone(&next.owners), Arc::clone(&emitters));
             next.emitters = emitters;
         }
-        next
+        Some(next)
     }
 
     /// A ledger with an empty pool.
@@ -110,4 +120,9 @@ impl Simulation {
         self.advance(&mut ledger, self.emitters.lights.iter().map(tasks).sum());
         ledger
     }
+}
+
+/// Whether two versions of a scene have the same virtual surface lights: [`Simulation::has_lights_of`].
+pub(crate) fn have_same_lights(a: &Scene, b: &Scene) -> bool {
+    Arc::ptr_eq(&a.geometry.rest_vertices, &b.geometry.rest_vertices) && a.streaming == b.streaming
 }

@@ -65,6 +65,12 @@ impl Animation {
         (1..=MOST_ROUNDS).map(|rounds| longest * f64::from(rounds)).find(|all| fits(*all))
     }
 
+    /// From what time on nothing changes any more, s; `None` where something is repeated for ever.
+    pub fn end_s(&self) -> Option<f64> {
+        let tracks = self.targets.iter().flat_map(|target| &target.tracks);
+        tracks.map(|(_, track)| track.end()).try_fold(0.0, |last, end| Some(end?.max(last)))
+    }
+
     /// Puts everything that is animated where it is at `time_s`, in simulated seconds since the scene's beginning, by
     /// edits as [`SceneEdit::set_light`] and [`SceneEdit::move_object`] make them; what is not animated stays. What was
     /// applied before does not matter.

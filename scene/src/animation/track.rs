@@ -48,6 +48,12 @@ impl Track {
             Repeat::Once => None,
         }
     }
+
+    /// From what time on it changes no more, s; `None` where it is repeated.
+    pub(super) fn end(&self) -> Option<f64> {
+        let end = self.path.duration();
+        (self.repeat == Repeat::Once || end == 0.0).then_some(end)
+    }
 }
 
 impl Path {
@@ -130,12 +136,15 @@ mod tests {
         assert_eq!([4.0, 5.0, 1e300].map(|t| at(Repeat::Once, t)), [-1.0, -1.0, -1.0]);
         let period = |repeat| keyframes(Interpolation::Linear, repeat).period();
         assert_eq!([Repeat::Loop, Repeat::Bounce, Repeat::Once].map(period), [Some(4.0), Some(8.0), None]);
+        let end = |repeat| keyframes(Interpolation::Linear, repeat).end();
+        assert_eq!([Repeat::Loop, Repeat::Bounce, Repeat::Once].map(end), [None, None, Some(4.0)]);
         let path = Path::Keyframes {
             times: vec![0.0],
             values: vec![DVec3::X],
             interpolation: Interpolation::Linear,
         };
         assert_eq!(Track { path: path.clone(), repeat: Repeat::Loop }.at(7.0), DVec3::X);
+        assert_eq!(Track { path: path.clone(), repeat: Repeat::Loop }.end(), Some(0.0));
         assert_eq!(Track { path, repeat: Repeat::Once }.period(), Some(0.0));
     }
 

@@ -2,6 +2,7 @@
 
 use super::{CROWD, Candidate, Cell, Grid, NOBODY, OwnerTable};
 use crate::{
+    cancel::Cancel,
     placement::Placement,
     vsl::{COMPATIBLE_COSINE, Surface},
 };
@@ -22,6 +23,16 @@ const TRIANGLES_PER_TASK: u32 = 1024;
 impl OwnerTable {
     /// The table of `placement` on `scene`; the same on any number of threads.
     pub fn new(scene: &Scene, placement: &Placement) -> Self {
+        Self::build(scene, placement, &Cancel::default())
+    }
+
+    /// [`OwnerTable::new`], or `None` soon after it was cancelled.
+    pub fn new_unless(scene: &Scene, placement: &Placement, cancel: &Cancel) -> Option<Self> {
+        cancel.or(Self::build(scene, placement, cancel))
+    }
+
+    /// With cells missing where it was cancelled.
+    fn build(scene: &Scene, placement: &Placement, cancel: &Cancel) -> Self {
         let none = Grid { first: NOBODY, columns: 0, rows: 0 };
         let mut table =
             Self { grids: vec![[none; 2]; scene.geometry.triangles.len()], cells: vec![], crowds: vec![] };
@@ -39,7 +50,7 @@ impl OwnerTable {
                     let end = start.saturating_add(TRIANGLES_PER_TASK).min(triangles.end);
                     let mut part = Part::default();
                     (start..end).for_each(|t| {
-                        part.add_triangle(&scene.geometry, &lights, t, spacing * CELL_PER_SPACING)
+                        part.add_triangle(&scene.geometry, &lights, t, spacing * CELL_PER_SPACING, cancel)
                     });
                     part
                 })
@@ -130,7 +141,14 @@ struct Part {
 }
 
 impl Part {
-    fn add_triangle(&mut self, geometry: &Geometry, lights: &Lights, triangle: u32, cell_edge: f32) {
+    fn add_triangle(
+        &mut self,
+        geometry: &Geometry,
+        lights: &Lights,
+        triangle: u32,
+        cell_edge: f32,
+        cancel: &Cancel,
+    ) {
         let [a, b, c] = geometry.rest_triangle(triangle);
         let (edge_u, edge_v) = (b - a, c - a);
         let count = |edge: Vec3| (edge.length() / cell_edge).ceil().clamp(1.0, MOST_CELLS);
@@ -145,6 +163,9 @@ impl Part {
         let radius = 0.5 * (step_u + step_v).length().max((step_u - step_v).length());
         let normal = geometry.normals[triangle as usize];
         for row in 0..grid.rows {
+            if cancel.is_cancelled() {
+                return;
+            }
             for column in 0..grid.columns {
                 let (u, v) = ((f32::from(column) + 0.5) / columns, (f32::from(row) + 0.5) / rows);
                 let outside = f32::from(column) / columns + f32::from(row) / rows > 1.0;

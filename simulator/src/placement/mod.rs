@@ -13,6 +13,7 @@ mod share;
 mod thin;
 
 use crate::{
+    cancel::Cancel,
     owner::OwnerTable,
     vsl::{Surface, Vsl},
 };
@@ -43,16 +44,35 @@ impl Placement {
         Self::with(scene, settings.vsls, settings.seed, settings.placement_scale, OVERSAMPLING)
     }
 
+    /// [`Placement::new`], or `None` soon after it was cancelled.
+    pub fn new_unless(scene: &Scene, cancel: &Cancel) -> Option<Self> {
+        let settings = &scene.streaming;
+        let scale = settings.placement_scale;
+        cancel.or(Self::place(scene, settings.vsls, settings.seed, scale, OVERSAMPLING, cancel))
+    }
+
     /// [`Placement::new`] with all parameters given: the number of lights, the seed, the scale of triangles about their
     /// centroid, and the points drawn for each that stays.
     pub fn with(scene: &Scene, vsls: u32, seed: u64, triangle_scale: f32, oversampling: f64) -> Self {
+        Self::place(scene, vsls, seed, triangle_scale, oversampling, &Cancel::default())
+    }
+
+    /// Too many lights where it was cancelled.
+    fn place(
+        scene: &Scene,
+        vsls: u32,
+        seed: u64,
+        triangle_scale: f32,
+        oversampling: f64,
+        cancel: &Cancel,
+    ) -> Self {
         let shares = share::by_area(scene, vsls);
         let placed: Vec<Vec<Vsl>> = shares
             .par_iter()
             .map(|share| {
                 let drawn = (f64::from(share.vsls) * oversampling).ceil() as u32;
                 let points = draw::points(scene, share.surface, share.vsls, drawn, seed, triangle_scale);
-                thin::to(&scene.geometry, points, share.vsls as usize)
+                thin::to(&scene.geometry, points, share.vsls as usize, cancel)
             })
             .collect();
         let mut surfaces = Vec::with_capacity(shares.len());

@@ -1,6 +1,9 @@
 //! Turns too many points into an even spread: removes the one with the closest two neighbours until enough are gone.
 
-use crate::vsl::{COMPATIBLE_COSINE, Vsl};
+use crate::{
+    cancel::Cancel,
+    vsl::{COMPATIBLE_COSINE, Vsl},
+};
 use glam::Vec3;
 use photonstream_scene::Geometry;
 use rstar::{RTree, primitives::GeomWithData};
@@ -11,17 +14,19 @@ type Tree = RTree<GeomWithData<[f32; 3], u32>>;
 /// Removes points, one at a time, the one with the smallest (d_min1, d_min2) first, until `keep` remain; keeps order.
 ///
 /// Distances are in rest space and count between points with compatible normals only. Of equal pairs the lowest index
-/// goes first.
-pub(super) fn to(geometry: &Geometry, points: Vec<Vsl>, keep: usize) -> Vec<Vsl> {
+/// goes first. Where it is cancelled, more remain.
+pub(super) fn to(geometry: &Geometry, points: Vec<Vsl>, keep: usize, cancel: &Cancel) -> Vec<Vsl> {
     if points.len() <= keep {
         return points;
     }
     let spread = Spread::new(geometry, &points);
     let mut alive = vec![true; points.len()];
-    let mut heap: BinaryHeap<Reverse<Entry>> =
-        (0..points.len() as u32).map(|i| Reverse(spread.entry(i, &alive))).collect();
+    let mut heap: BinaryHeap<Reverse<Entry>> = (0..points.len() as u32)
+        .take_while(|_| !cancel.is_cancelled())
+        .map(|i| Reverse(spread.entry(i, &alive)))
+        .collect();
     let mut count = points.len();
-    while count > keep {
+    while count > keep && !cancel.is_cancelled() {
         let Some(Reverse(entry)) = heap.pop() else { break };
         // A stale entry is too small, never too large: distances only grow as points go. So the renewed entries alone
         // decide, and the first one that is still true is the smallest.

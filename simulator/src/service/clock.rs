@@ -55,6 +55,11 @@ impl Clock {
         self.waits = false;
     }
 
+    /// There is something else to be shown whole first.
+    pub(super) fn wait(&mut self) {
+        self.waits = true;
+    }
+
     pub(super) fn pause(&mut self, paused: bool) {
         if self.paused != paused {
             (self.paused, self.last) = (paused, Instant::now());

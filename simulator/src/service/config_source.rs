@@ -2,7 +2,10 @@
 
 use crate::cli::Overrides;
 use photonstream_scene::{Scene, SceneConfig, SceneError};
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
 
 /// Where the scene of a simulation comes from.
 #[derive(Clone, Debug)]
@@ -13,12 +16,14 @@ pub struct ConfigSource {
     pub overrides: Overrides,
     /// The text that was loaded last.
     text: Option<String>,
+    /// When loading it began.
+    since: SystemTime,
 }
 
 impl ConfigSource {
     /// The config at `path`.
     pub fn new(path: impl Into<PathBuf>, overrides: Overrides) -> Self {
-        Self { path: path.into(), overrides, text: None }
+        Self { path: path.into(), overrides, text: None, since: SystemTime::UNIX_EPOCH }
     }
 
     /// The scene as the file is now.
@@ -26,6 +31,7 @@ impl ConfigSource {
     /// # Errors
     /// If it cannot be read, or is not valid.
     pub fn load(&mut self) -> Result<Scene, SceneError> {
+        self.since = SystemTime::now();
         let text = std::fs::read_to_string(&self.path)
             .map_err(|source| SceneError::Read { file: self.path.clone(), source })?;
         let scene = self.load_text(&text)?;
@@ -36,6 +42,11 @@ impl ConfigSource {
     /// The text that was loaded last.
     pub(super) fn text(&self) -> Option<&str> {
         self.text.as_deref()
+    }
+
+    /// When it was begun to be loaded last: files that were written since may not be what was read.
+    pub(super) fn since(&self) -> SystemTime {
+        self.since
     }
 
     /// The scene that `text` would be in the place of the file.

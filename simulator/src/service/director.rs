@@ -1,21 +1,21 @@
 //! Turns requests and signals into what the actors do, from their start to their end.
 
+mod scenes;
 mod start;
 
 use super::{
     ConfigSource,
     clock::Clock,
-    edits::{self, Edits},
-    ledger_actor::{Change, ToLedger, Version},
+    edits,
+    ledger_actor::{Change, State, ToLedger},
+    loader::Loaded,
+    placements::Placements,
+    placer::Order,
     publisher_actor::Still,
-    settings::{self, SettingsError},
     watcher::News,
 };
 use crate::{counters::Counters, error::SimulatorError, simulation::Simulation};
-use photonstream_protocol::{
-    ChannelName, ControlServer, Incoming, ProtocolError, Reply, Request, monotonic_ns,
-};
-use photonstream_scene::Scene;
+use photonstream_protocol::{ChannelName, ControlServer, Incoming, ProtocolError, Replier, Reply, Request};
 use serde::Serialize;
 use std::{
     sync::{
@@ -85,6 +85,12 @@ enum Event {
     News(News),
     /// The watcher has ended.
     Unwatched,
+    /// The config was loaded, as somebody asked.
+    Loaded(Box<Loaded>),
+    /// The loader has ended.
+    LoaderGone,
+    /// The placer has done what it was told, or what it was told is not wanted any more.
+    Placed(Option<Box<Simulation>>),
     /// The light of a version was shown whole.
     Settled(u64),
     /// It is time to look at the animation.
@@ -98,7 +104,8 @@ struct Director {
     simulation: Simulation,
     still: Arc<Still>,
     clock: Clock,
-    config: Option<ConfigSource>,
+    /// The instant of the animation that is simulated, s.
+    animated_s: f64,
     /// Why the animation stood still last.
     animation_error: String,
     /// Hash of the config that was loaded last.
@@ -106,6 +113,12 @@ struct Director {
     news: flume::Receiver<News>,
     /// Ends the watcher when it is dropped.
     watching: Option<(flume::Sender<()>, JoinHandle<()>)>,
+    loader: Option<Loader>,
+    /// The scenes to come.
+    placements: Placements,
+    to_placer: flume::Sender<Order>,
+    placed: flume::Receiver<Option<Box<Simulation>>>,
+    placer: JoinHandle<()>,
     settled: flume::Receiver<u64>,
     /// Versions of the scene after the first.
     versions: u64,
@@ -120,59 +133,100 @@ struct Director {
     tracers: Vec<JoinHandle<()>>,
 }
 
+/// The way to and from who loads the config.
+struct Loader {
+    asked: flume::Sender<Replier>,
+    loaded: flume::Receiver<Loaded>,
+}
+
+/// What a query is answered.
+#[derive(Serialize)]
+struct Told {
+    #[serde(flatten)]
+    state: State,
+    /// Whether another scene is being made ready.
+    placing: bool,
+}
+
 impl Director {
     /// Until it is time to end; `None` if an actor ended before.
     fn direct(&mut self, stop: &flume::Receiver<()>) -> Option<Ending> {
         loop {
-            let selector = flume::Selector::new()
-                .recv(stop, |_| Event::Stop)
-                .recv(self.server.requests(), |request| request.map_or(Event::ActorGone, Event::Request))
-                .recv(&self.actor_gone, |_| Event::ActorGone)
-                .recv(&self.settled, |settled| settled.map_or(Event::ActorGone, Event::Settled));
-            // A watcher that is not there has nothing to tell.
-            let selector = match &self.watching {
-                Some(_) => selector.recv(&self.news, |news| news.map_or(Event::Unwatched, Event::News)),
-                None => selector,
-            };
-            let is_animated = !self.simulation.scene.animation.is_empty();
-            let event = match self.clock.next().filter(|_| is_animated) {
-                Some(due) => selector.wait_deadline(due).unwrap_or(Event::Tick),
-                None => selector.wait(),
-            };
+            let event = self.wait(stop);
             match event {
                 Event::Stop => return Some(Ending::Stopped),
                 // An actor ended before its time; `end` finds out which, and why.
                 Event::ActorGone => return None,
-                Event::Settled(version) if version == self.versions => self.clock.settled(),
-                // Of a version that is no longer shown.
-                Event::Settled(_) => {}
-                Event::Tick => {
-                    self.clock.tick(Instant::now());
-                    if !self.animate() {
-                        // There is nothing to wait for.
-                        self.clock.settled();
-                    }
-                }
-                Event::News(news) => self.hear(news),
-                Event::Unwatched => {
-                    self.watching = None;
-                    self.refuse("the watcher of the config has failed, a bug: please report it; changes need --reload");
-                }
-                Event::Request(incoming) => {
-                    let Some(Incoming { request, replier, .. }) = self.edit(incoming) else { continue };
-                    let ends = matches!(request, Request::Shutdown);
-                    let reply = self.answer(request);
-                    replier.reply(reply);
-                    if ends {
-                        return Some(Ending::Shutdown);
+                event => {
+                    if let Some(ending) = self.handle(event) {
+                        return Some(ending);
                     }
                 }
             }
         }
     }
 
-    fn answer(&mut self, request: Request) -> Reply {
-        match request {
+    fn wait(&self, stop: &flume::Receiver<()>) -> Event {
+        let selector = flume::Selector::new()
+            .recv(stop, |_| Event::Stop)
+            .recv(self.server.requests(), |request| request.map_or(Event::ActorGone, Event::Request))
+            .recv(&self.actor_gone, |_| Event::ActorGone)
+            .recv(&self.placed, |placed| placed.map_or(Event::ActorGone, Event::Placed))
+            .recv(&self.settled, |settled| settled.map_or(Event::ActorGone, Event::Settled));
+        // Who is not there has nothing to tell.
+        let selector = match &self.watching {
+            Some(_) => selector.recv(&self.news, |news| news.map_or(Event::Unwatched, Event::News)),
+            None => selector,
+        };
+        let selector = match &self.loader {
+            Some(loader) => selector.recv(&loader.loaded, |loaded| {
+                loaded.map_or(Event::LoaderGone, |loaded| Event::Loaded(Box::new(loaded)))
+            }),
+            None => selector,
+        };
+        match self.due() {
+            Some(due) => selector.wait_deadline(due).unwrap_or(Event::Tick),
+            None => selector.wait(),
+        }
+    }
+
+    /// Follows an event; why it is time to end, if it is.
+    fn handle(&mut self, event: Event) -> Option<Ending> {
+        match event {
+            Event::Stop => return Some(Ending::Stopped),
+            Event::ActorGone => return None,
+            Event::Settled(version) if version == self.versions => self.clock.settled(),
+            // Of a version that is no longer shown.
+            Event::Settled(_) => {}
+            Event::Tick => self.tick(Instant::now()),
+            Event::News(news) => self.hear(news),
+            Event::Unwatched => {
+                self.watching = None;
+                self.refuse(
+                    "the watcher of the config has failed, a bug: please report it; changes need --reload",
+                );
+            }
+            Event::Loaded(loaded) => {
+                let Loaded { scene, replier } = *loaded;
+                match scene {
+                    Ok(scene) => self.want_config(scene, Some(replier)),
+                    // Whoever asked is told; the watcher tells all others, as long as it is so.
+                    Err(error) => replier.reply(edits::refusal(&error)),
+                }
+            }
+            Event::LoaderGone => self.loader = None,
+            Event::Placed(simulation) => self.take_placed(simulation),
+            Event::Request(incoming) => {
+                let Incoming { request, replier } = self.edit(incoming)?;
+                return self.answer(request, replier);
+            }
+        }
+        None
+    }
+
+    /// Answers a request that is no edit, or sees to it that it is answered later; why it is time to end, if it is.
+    fn answer(&mut self, request: Request, replier: Replier) -> Option<Ending> {
+        let reply = match request {
             Request::Pause => {
                 self.clock.pause(true);
                 self.change(Change::Pause)
@@ -182,29 +236,24 @@ impl Director {
                 self.change(Change::Resume)
             }
             Request::Step => {
-                if self.clock.is_paused() {
-                    self.clock.step();
-                    self.animate();
-                }
-                self.change(Change::Step)
+                self.step(replier);
+                return None;
             }
-            Request::Shutdown => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
-            Request::Query => match self.ask(ToLedger::Query).map(serde_json::to_value) {
-                Some(Ok(state)) => Reply::State { state },
-                Some(Err(error)) => Reply::error("internal", error.to_string()),
+            Request::Shutdown => {
+                replier.reply(Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) });
+                return Some(Ending::Shutdown);
+            }
+            Request::Query => match self.ask(ToLedger::Query) {
+                Some(state) => self.tell(state),
                 None => Self::busy(),
             },
-            Request::Reload => self.reload(),
+            Request::Reload => {
+                self.reload(replier);
+                return None;
+            }
             Request::SetStreaming { values } => {
-                match settings::with_settings(&self.simulation.scene, &values) {
-                    Ok(scene) => {
-                        self.clock.set(scene.streaming.fixed_step_ms, publish_period(&scene));
-                        self.show(scene, monotonic_ns())
-                    }
-                    Err(SettingsError::Value(error)) => Reply::error(edits::code(&error), error.to_string()),
-                    Err(error @ SettingsError::Threads) => Reply::error("invalid-value", error.to_string()),
-                    Err(error) => Reply::error("unknown-key", error.to_string()),
-                }
+                self.set_streaming(&values, replier);
+                return None;
             }
             Request::Hello { .. }
             | Request::SetLight { .. }
@@ -212,140 +261,15 @@ impl Director {
             | Request::SetMaterial { .. } => {
                 Reply::error("internal", "the request should have been answered before")
             }
-        }
-    }
-
-    /// Loads the config again, whether it has changed or not.
-    fn reload(&mut self) -> Reply {
-        let Some(config) = &mut self.config else {
-            return Reply::error("unsupported", "this simulation was not started from a config file");
         };
-        match config.load() {
-            Ok(scene) => self.show_config(scene),
-            // Whoever asked is told; the watcher tells all others, as long as it is so.
-            Err(error) => Reply::error(edits::code(&error), error.to_string()),
-        }
+        replier.reply(reply);
+        None
     }
 
-    /// Follows what the watcher has seen.
-    fn hear(&mut self, news: News) {
-        match news {
-            // As loaded it is what is simulated already: edits since then stay.
-            News::Scene(scene) if scene.hash == self.loaded_hash => {
-                if !self.still.notice.is_empty() {
-                    tracing::info!("the config is again what is simulated");
-                    self.tell_all("");
-                }
-            }
-            News::Scene(scene) => {
-                tracing::info!("the config has changed: it is simulated from now on");
-                self.show_config(*scene);
-            }
-            News::Broken(reason) => self.refuse(&reason),
-        }
-    }
-
-    /// Goes on with the scene of another config, at the time that it is.
-    fn show_config(&mut self, scene: Scene) -> Reply {
-        let received_ns = monotonic_ns();
-        for notice in &scene.notices {
-            tracing::warn!("{}: {notice}", scene.name);
-        }
-        self.loaded_hash = scene.hash;
-        self.clock.set(scene.streaming.fixed_step_ms, publish_period(&scene));
-        let scene = self.at_present(&scene).unwrap_or(scene);
-        let mut still = self.still.next(&scene);
-        still.config_generation += 1;
-        still.notice = Arc::from("");
-        self.show_as(scene, still, received_ns)
-    }
-
-    /// Keeps what is simulated, and says everywhere why.
-    fn refuse(&mut self, reason: &str) {
-        tracing::warn!("the changed config is not shown, the last valid one stays: {reason}");
-        self.tell_all(reason);
-    }
-
-    fn tell_all(&mut self, notice: &str) {
-        if *self.still.notice == *notice {
-            return;
-        }
-        let mut still = self.still.next(&self.simulation.scene);
-        still.notice = Arc::from(notice);
-        let scene = Scene::clone(&self.simulation.scene);
-        self.show_as(scene, still, monotonic_ns());
-    }
-
-    /// The scene at the time that it is; `None` where nothing in it is animated.
-    fn at_present(&mut self, scene: &Scene) -> Option<Scene> {
-        if scene.animation.is_empty() {
-            return None;
-        }
-        let mut edit = scene.edit();
-        match scene.animation.apply(self.clock.time_s(), &mut edit) {
-            Ok(()) => Some(edit.finish()),
-            Err(error) => {
-                let error = error.to_string();
-                if self.animation_error != error {
-                    tracing::warn!("the animation stands still: {error}");
-                    self.animation_error = error;
-                }
-                None
-            }
-        }
-    }
-
-    /// Puts what is animated where it is now; false where it is there already, or cannot be.
-    fn animate(&mut self) -> bool {
-        let received_ns = monotonic_ns();
-        let before = Arc::clone(&self.simulation.scene);
-        let Some(scene) = self.at_present(&before) else { return false };
-        let is_still = Arc::ptr_eq(&scene.geometry, &before.geometry) && scene.lights == before.lights;
-        if is_still {
-            return false;
-        }
-        self.show(scene, received_ns);
-        true
-    }
-
-    /// Applies an edit, together with all edits that wait behind it, as one new version of the scene. Returns the request
-    /// that follows them, if it is no edit.
-    fn edit(&mut self, incoming: Incoming) -> Option<Incoming> {
-        let received_ns = monotonic_ns();
-        let mut edits = Edits::of(&self.simulation.scene);
-        let rest = edits.take(incoming, self.server.requests());
-        if let Some((scene, repliers)) = edits.finish() {
-            let reply = self.show(scene, received_ns);
-            repliers.into_iter().for_each(|replier| replier.reply(reply.clone()));
-        }
-        rest
-    }
-
-    /// Makes `scene` the version that is simulated and shown.
-    fn show(&mut self, scene: Scene, received_ns: u64) -> Reply {
-        let still = self.still.next(&scene);
-        self.show_as(scene, still, received_ns)
-    }
-
-    fn show_as(&mut self, scene: Scene, still: Still, received_ns: u64) -> Reply {
-        let scene = Arc::new(scene);
-        let next = if self.simulation.has_lights_of(&scene) {
-            self.simulation.with_scene(scene)
-        } else {
-            self.simulation.reloaded(scene)
-        };
-        (self.simulation, self.still) = (next, Arc::new(still));
-        self.versions += 1;
-        let version = Version {
-            simulation: self.simulation.clone(),
-            still: Arc::clone(&self.still),
-            received_ns,
-            time_s: self.clock.time_s(),
-            only_whole: self.clock.is_fixed() && !self.simulation.scene.animation.is_empty(),
-        };
-        match self.ask(|sender| ToLedger::Edit(Box::new(version), sender)) {
-            Some(frame) => Reply::Ok { frame },
-            None => Self::busy(),
+    fn tell(&self, state: State) -> Reply {
+        match serde_json::to_value(Told { state, placing: self.placements.are_awaited() }) {
+            Ok(state) => Reply::State { state },
+            Err(error) => Reply::error("internal", error.to_string()),
         }
     }
 
@@ -376,6 +300,11 @@ impl Director {
             // A watcher that panicked has ended, too.
             let _ = watcher.join();
         }
+        // It has nothing that somebody else needs: a config that takes long to load keeps nobody.
+        drop(self.loader);
+        self.placements.end();
+        drop((self.to_placer, self.placed));
+        let placer = self.placer.join();
         // The ledger may be gone already.
         let _ = self.to_ledger.send(ToLedger::Stop);
         let ledger = self.ledger.join();
@@ -385,6 +314,7 @@ impl Director {
         // All have ended before anything is said, so that the channel is free again.
         let stopped = |actor| SimulatorError::ActorStopped { actor };
         tracers.into_iter().collect::<Result<Vec<()>, _>>().map_err(|_| stopped("tracer"))?;
+        placer.map_err(|_| stopped("placer"))?;
         publisher.map_err(|_| stopped("publisher"))??;
         let counters = ledger.map_err(|_| stopped("ledger"))?;
         let ending = ending.ok_or_else(|| stopped("control server"))?;
@@ -397,9 +327,4 @@ impl Director {
             counters,
         })
     }
-}
-
-/// Time between two frames.
-fn publish_period(scene: &Scene) -> Duration {
-    Duration::from_secs_f32(scene.streaming.publish_period_ms.max(0.1) / 1e3)
 }

@@ -1,13 +1,14 @@
 //! Turns a scene into a running service: actors joined by channels, each owning what it writes.
 //!
 //! ```text
-//! config watcher ─┐
-//! control socket ─┤
-//! signals, clock ─┴─ director ─→ ledger ⇄ tracers × N        (tasks out, finished batches in)
-//!                                  └────→ publisher ─→ shared memory
+//! config watcher ─┐          placer, loader
+//! control socket ─┤            ⇅
+//! signals, clock ─┴─────── director ─→ ledger ⇄ tracers × N        (tasks out, finished batches in)
+//!                                        └────→ publisher ─→ shared memory
 //! ```
 //!
-//! The director decides, and turns edits, saved configs and time into new versions of the scene, the ledger alone writes
+//! The director decides, and turns edits, saved configs and time into new versions of the scene; what takes long (reading
+//! a config, placing its lights) is done aside, so that it answers meanwhile. The ledger alone writes
 //! pool and flux, tracers have no state, the publisher alone writes shared memory. All channels are bounded: who is slow slows down who feeds it. When nothing is left to trace every thread
 //! sleeps.
 
@@ -16,8 +17,12 @@ mod config_source;
 mod director;
 mod edits;
 mod ledger_actor;
+mod loader;
+mod placements;
+mod placer;
 mod publisher_actor;
 mod settings;
+mod stamp;
 mod tracer_actor;
 mod watcher;
 

@@ -1,17 +1,18 @@
 //! Turns changes of a config file and its assets into scenes, or into the reason why there is none.
 //!
 //! The folder is watched, not the file, which editors replace. After a change the file is read once it has been quiet for
-//! a moment, twice, until both readings are equal; an empty file is one that is being saved. Where the system tells nothing
+//! a moment, twice, until both readings are equal; an empty file is one that is being saved. Its assets are read again where
+//! they have changed meanwhile. Where the system tells nothing
 //! (network folders, a folder that was removed and made again) a look at sizes and times every half second finds it.
 
-use super::{config_source, config_source::ConfigSource, spawn};
+use super::{config_source, config_source::ConfigSource, spawn, stamp::Stamp};
 use crate::error::SimulatorError;
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
-use photonstream_scene::Scene;
+use photonstream_scene::{Scene, SceneError};
 use std::{
     io,
     path::{Path, PathBuf},
-    time::{Duration, Instant, SystemTime},
+    time::{Duration, Instant},
 };
 
 /// What has become of the config.
@@ -28,6 +29,8 @@ const QUIET: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_millis(250);
 /// Time between two readings that have to be equal.
 const BETWEEN: Duration = Duration::from_millis(10);
+/// How often assets are read that change meanwhile, before others get their turn.
+const READINGS: u32 = 3;
 /// Time between two looks for changes that nobody told of.
 const LOOK: Duration = Duration::from_millis(500);
 /// A file that is not there for so many looks is gone, and not being replaced.
@@ -47,7 +50,8 @@ pub(super) fn start(
         watched: false,
         told,
         tried: source.text().map(str::to_owned),
-        seen: Fingerprint::default(),
+        config_seen: Stamp::default(),
+        assets_seen: Vec::new(),
         told_last: Told::Scene(loaded.hash),
         missing: 0,
         source,
@@ -76,7 +80,9 @@ struct Watch {
     told: flume::Receiver<()>,
     /// The text that was tried last.
     tried: Option<String>,
-    seen: Fingerprint,
+    /// The config as it was looked at last, and its assets as they were read.
+    config_seen: Stamp,
+    assets_seen: Vec<Stamp>,
     told_last: Told,
     missing: u32,
 }
@@ -90,10 +96,6 @@ enum Told {
     Broken(String),
 }
 
-/// Sizes and times of the config and its assets.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Fingerprint(Vec<Option<(u64, Option<SystemTime>)>>);
-
 enum Heard {
     Change,
     Nothing,
@@ -103,9 +105,10 @@ enum Heard {
 impl Watch {
     fn run(mut self, news: &flume::Sender<News>, stop: &flume::Receiver<()>) {
         self.listen();
-        // Somebody may have saved the config while the scene was made ready.
-        self.seen = self.fingerprint();
-        self.seen.0[0] = None;
+        // Somebody may have saved the config or an asset while the scene was made ready.
+        let since = self.source.since();
+        let read = |stamp: Stamp| if stamp.is_since(since) { Stamp::default() } else { stamp };
+        self.assets_seen = self.assets().into_iter().map(read).collect();
         loop {
             let was_told = match self.hear(LOOK, stop) {
                 Heard::Stop => return,
@@ -113,8 +116,9 @@ impl Watch {
                 Heard::Change => true,
                 Heard::Nothing => false,
             };
-            let now = self.fingerprint();
-            let is_missing = now.0.first().is_none_or(Option::is_none);
+            let config = Stamp::of(&self.source.path);
+            let assets_changed = self.assets() != self.assets_seen;
+            let is_missing = config.is_of_nothing();
             self.missing = if is_missing { self.missing + 1 } else { 0 };
             if is_missing {
                 self.watched = false;
@@ -123,17 +127,15 @@ impl Watch {
             }
             let is_gone = self.missing == GONE_AFTER;
             // Two saves may have one time.
-            if now == self.seen && !is_gone && !was_told {
+            if config == self.config_seen && !assets_changed && !is_gone && !was_told {
                 continue;
             }
-            let assets_changed = now.0.get(1..) != self.seen.0.get(1..);
             if let Some(message) = self.look(assets_changed, is_gone)
                 && news.send(message).is_err()
             {
                 return;
             }
-            // A scene has its own files: they are looked at from now on.
-            self.seen = if is_missing { Fingerprint::default() } else { self.fingerprint() };
+            self.config_seen = config;
         }
     }
 
@@ -173,9 +175,44 @@ impl Watch {
         true
     }
 
-    fn fingerprint(&self) -> Fingerprint {
-        let look = |path: &PathBuf| path.metadata().ok().map(|m| (m.len(), m.modified().ok()));
-        Fingerprint([&self.source.path].into_iter().chain(&self.files).map(look).collect())
+    fn assets(&self) -> Vec<Stamp> {
+        self.files.iter().map(|file| Stamp::of(file)).collect()
+    }
+
+    /// The scene of a text with its assets as they were all the while they were read; `None` where they go on changing.
+    fn load(&mut self, text: &str) -> Option<Result<Scene, SceneError>> {
+        for _ in 0..READINGS {
+            let before = self.assets();
+            // Two writes of one size within a tick have one time.
+            std::thread::sleep(BETWEEN);
+            let loaded = self.source.load_text(text);
+            let has_same_files = self.follow(&loaded);
+            let is_whole = has_same_files && self.assets() == before;
+            self.assets_seen = before;
+            if is_whole {
+                return Some(loaded);
+            }
+        }
+        None
+    }
+
+    /// Looks from now on at the files that were read, and those that were missed; true where it does already.
+    fn follow(&mut self, loaded: &Result<Scene, SceneError>) -> bool {
+        let files = match loaded {
+            Ok(scene) => scene.files.to_vec(),
+            Err(error) => {
+                let is_new = |file: &PathBuf| !file.as_os_str().is_empty() && !self.files.contains(file);
+                let missing = config_source::missing(error).into_iter().filter(is_new);
+                self.files.iter().cloned().chain(missing).collect()
+            }
+        };
+        let has_same_files = files == self.files;
+        if !has_same_files {
+            self.files = files;
+            self.watched = false;
+            self.listen();
+        }
+        has_same_files
     }
 
     /// What there is to tell after a change.
@@ -194,27 +231,14 @@ impl Watch {
         if self.tried.as_ref() == Some(&text) && !assets_changed {
             return None;
         }
-        let loaded = self.source.load_text(&text);
+        let loaded = self.load(&text)?;
         self.tried = Some(text);
         match loaded {
-            Ok(scene) => {
-                if *scene.files != *self.files {
-                    self.files = scene.files.to_vec();
-                    self.watched = false;
-                }
-                match std::mem::replace(&mut self.told_last, Told::Scene(scene.hash)) {
-                    Told::Scene(hash) if hash == scene.hash => None,
-                    _ => Some(News::Scene(Box::new(scene))),
-                }
-            }
-            Err(error) => {
-                // A file that it waits for is looked for, too.
-                let missing = config_source::missing(&error);
-                self.files.extend(missing.into_iter().filter(|file| !file.as_os_str().is_empty()));
-                self.files.dedup();
-                self.watched = false;
-                self.tell_broken(error.to_string())
-            }
+            Ok(scene) => match std::mem::replace(&mut self.told_last, Told::Scene(scene.hash)) {
+                Told::Scene(hash) if hash == scene.hash => None,
+                _ => Some(News::Scene(Box::new(scene))),
+            },
+            Err(error) => self.tell_broken(error.to_string()),
         }
     }
 

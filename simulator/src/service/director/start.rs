@@ -1,13 +1,15 @@
 //! Turns a simulation into actors that run, joined by channels.
 
-use super::{Director, Options, publish_period};
+use super::{Director, Loader, Options, scenes};
 use crate::{
     error::SimulatorError,
     records,
     service::{
         Farewell,
-        clock::Clock,
         ledger_actor::LedgerActor,
+        loader,
+        placements::Placements,
+        placer,
         publisher_actor::{PlacedRecords, PublisherActor, RECORD_SETS, Still},
         spawn, tracer_actor, watcher,
     },
@@ -102,15 +104,39 @@ impl Director {
             }
             None => None,
         };
-        let period = publish_period(&scene);
+        let loader = match &options.config {
+            Some(source) => {
+                // At most one message for each connection, which waits for the answer.
+                let (asked, asks) = flume::unbounded();
+                let (answer, loaded) = flume::bounded(1);
+                let source = source.clone();
+                spawn("config loader", move || loader::run(source, &asks, &answer))?;
+                Some(Loader { asked, loaded })
+            }
+            None => None,
+        };
+        let (to_placer, orders) = flume::bounded(1);
+        let (answer, placed) = flume::bounded(1);
+        let placer = {
+            let farewell = Farewell(farewells);
+            spawn("placer", move || {
+                let _farewell = farewell;
+                placer::run(&orders, &answer);
+            })?
+        };
         Ok(Self {
             scene_name: scene.name.clone(),
-            clock: Clock::new(scene.streaming.fixed_step_ms, period),
-            config: options.config.clone(),
+            clock: scenes::clock(&scene),
+            animated_s: 0.0,
             loaded_hash: scene.hash,
             animation_error: String::new(),
             news,
             watching,
+            loader,
+            placements: Placements::default(),
+            to_placer,
+            placed,
+            placer,
             settled,
             versions: 0,
             simulation,
