@@ -66,7 +66,14 @@ impl Change {
     /// Whether the path of a light through `vertices` may be another one in the new version.
     #[inline]
     pub fn concerns(&self, light: usize, vertices: &[Vertex]) -> bool {
-        self.lights[light].stale || self.disturbance.concerns(vertices)
+        self.kept(light, vertices).is_some()
+    }
+
+    /// How many first points of the path of a light through `vertices` are those of its path in the new version, whatever
+    /// becomes of the others (255 where they are more); `None` where it stays as it is.
+    #[inline]
+    pub(crate) fn kept(&self, light: usize, vertices: &[Vertex]) -> Option<u8> {
+        if self.lights[light].stale { Some(0) } else { self.disturbance.first_met(vertices).map(at_most_255) }
     }
 
     /// Looks through all paths of `pool` at once, on the present rayon pool.
@@ -100,11 +107,24 @@ impl Concerned<'_> {
     /// [`Change::concerns`] of the path of `light` in `slot`; none is concerned where there is no path.
     #[inline]
     pub fn contains(&self, light: usize, slot: u32) -> bool {
+        self.kept(light, slot).is_some()
+    }
+
+    /// [`Change::kept`] of the path of `light` in `slot`.
+    #[inline]
+    pub(crate) fn kept(&self, light: usize, slot: u32) -> Option<u8> {
         match &self.encounters {
-            Some(encounters) => self.change.lights[light].stale || self.pool.is_among(slot, encounters),
-            None => self.change.concerns(light, self.pool.trail(slot).unwrap_or_default()),
+            Some(_) if self.change.lights[light].stale => Some(0),
+            Some(encounters) => self.pool.first_met(slot, encounters).map(at_most_255),
+            None => self.change.kept(light, self.pool.trail(slot).unwrap_or_default()),
         }
     }
+}
+
+/// A beginning of a path may be taken for a shorter one.
+#[inline]
+pub(crate) fn at_most_255(points: usize) -> u8 {
+    points.min(255) as u8
 }
 
 fn light_revisions(old: &Simulation, new: &Simulation) -> Vec<LightRevision> {

@@ -168,10 +168,11 @@ impl Disturbance {
         self.triangles.is_empty() && self.obstacles.is_empty()
     }
 
-    /// Whether the path through `vertices` may differ in the new version.
+    /// How many of the first points of the path through `vertices` are the same in the new version, whatever becomes of the
+    /// others; `None` where the whole path is.
     #[inline]
-    pub(crate) fn concerns(&self, vertices: &[Vertex]) -> bool {
-        vertices.windows(2).any(|ends| self.is_met(&ends[0], &ends[1]))
+    pub(crate) fn first_met(&self, vertices: &[Vertex]) -> Option<usize> {
+        vertices.windows(2).position(|ends| self.is_met(&ends[0], &ends[1])).map(|segment| segment + 1)
     }
 
     /// Whether the segment of a path between two points met it, or ended on it.
@@ -274,16 +275,18 @@ pub(crate) mod tests {
     fn paths_that_met_nothing_new_are_left_alone() {
         let at = |x: f32, triangle| Vertex::hit(Vec3::new(x, 0.0, 0.0), triangle, Side::Front, true);
         let path = [Vertex::emitted(Vec3::ZERO), at(1.0, 5), at(2.0, 9), Vertex::escaped(Vec3::Y)];
-        let touched = |ranges: &[Range<u32>]| Disturbance::new(ranges.to_vec(), vec![]).concerns(&path);
+        let touched =
+            |ranges: &[Range<u32>]| Disturbance::new(ranges.to_vec(), vec![]).first_met(&path).is_some();
         assert!(touched(&[5..6]) && touched(&[0..1, 9..12]) && touched(&[0..2, 4..8, 20..30]));
         assert!(!touched(&[6..9]) && !touched(&[0..5, 6..9, 10..99]) && !touched(&[]));
         let obstacle =
             |low: Vec3, high: Vec3| boxed(0.5 * (low + high), 0.5 * (high - low), Mat3A::IDENTITY, 100.0);
-        let boxed = |low, high| Disturbance::new([], vec![obstacle(low, high)]).concerns(&path);
+        let boxed = |low, high| Disturbance::new([], vec![obstacle(low, high)]).first_met(&path).is_some();
         assert!(boxed(Vec3::new(1.4, -0.1, -0.1), Vec3::new(1.6, 0.1, 0.1)));
         assert!(boxed(Vec3::new(1.9, 50.0, -0.1), Vec3::new(2.1, 60.0, 0.1)), "beyond where it left");
         assert!(!boxed(Vec3::new(1.4, 0.1, -0.1), Vec3::new(1.6, 0.3, 0.1)));
         assert!(!boxed(Vec3::new(1.9, -60.0, -0.1), Vec3::new(2.1, -50.0, 0.1)));
+        assert_eq!(Disturbance::new([9..10], vec![]).first_met(&path), Some(2));
         let many = (0..40).map(|i| obstacle(Vec3::splat(9.0 + i as f32), Vec3::splat(9.5 + i as f32)));
         assert!(Disturbance::new([], many.collect()).obstacles.len() <= MOST_OBSTACLES);
     }

@@ -1,9 +1,9 @@
 //! Turns lights into slots of the path pool: who emits how many paths, into which column of flux, from which samples.
 
-use crate::{apportion::apportion, streams::stream_of};
+use crate::{split, streams::stream_of};
 use glam::Vec3;
 use photonstream_scene::{LightId, Scene};
-use photonstream_shading::{sobol::Sequence, tone::luminance};
+use photonstream_shading::sobol::Sequence;
 use std::ops::Range;
 
 /// The slots of one light.
@@ -46,42 +46,24 @@ pub struct Emitters {
     pub slots: u32,
 }
 
-/// The least share of the pool that a light gets, relative to an equal split: dark lights can be switched on, and their
-/// paths must be there then.
-const LEAST_SHARE: f64 = 1.0 / 16.0;
-
 impl Emitters {
     /// Splits `scene.streaming.pool_paths` slots by emitted power; at least one for each light, none without lights.
     pub fn new(scene: &Scene) -> Self {
-        let count = scene.lights.len();
-        if count == 0 {
-            return Self { lights: vec![], columns: vec![], slots: 0 };
-        }
-        let watts = watts(scene);
-        let total: f64 = watts.iter().map(|&w| f64::from(luminance(w))).sum();
-        let equal = 1.0 / count as f64;
-        let weights: Vec<f64> =
-            watts
-                .iter()
-                .map(|&w| {
-                    if total > 0.0 {
-                        (f64::from(luminance(w)) / total).max(equal * LEAST_SHARE)
-                    } else {
-                        equal
-                    }
-                })
-                .collect();
-        Self::split(scene, &apportion(&weights, scene.streaming.pool_paths))
+        Self::with_slots(scene, &split::by_power(scene))
     }
 
     /// The same split for an edited version of the scene, whatever power its lights have now: slots keep their samples.
     pub fn with_scene(&self, scene: &Scene) -> Self {
-        let slots: Vec<u32> = self.lights.iter().map(|l| l.slots.end - l.slots.start).collect();
-        Self::split(scene, &slots)
+        Self::with_slots(scene, &self.slot_counts())
+    }
+
+    /// Slots of each light.
+    pub fn slot_counts(&self) -> Vec<u32> {
+        self.lights.iter().map(|l| l.slots.end - l.slots.start).collect()
     }
 
     /// The emitters of a scene of which each light has the given number of slots.
-    fn split(scene: &Scene, slots: &[u32]) -> Self {
+    pub fn with_slots(scene: &Scene, slots: &[u32]) -> Self {
         let count = scene.lights.len();
         if count == 0 {
             return Self { lights: vec![], columns: vec![], slots: 0 };
@@ -141,6 +123,6 @@ impl Emitters {
 }
 
 /// Watts that each light emits into the scene, linear RGB.
-fn watts(scene: &Scene) -> Vec<Vec3> {
+pub(crate) fn watts(scene: &Scene) -> Vec<Vec3> {
     scene.lights.iter().map(|l| l.light.power * l.light.shape.watts_per_power(scene.bounds)).collect()
 }

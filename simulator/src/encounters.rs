@@ -2,7 +2,7 @@
 //!
 //! The points are taken as they lie in memory, whichever paths they belong to, 64 at a time and without branches: of
 //! short paths one by one the mispredicted ends of loops cost more than the tests. The few segments that come near are
-//! then tested as [`Disturbance::concerns`] does: whether any bit of a path is set says the same, exactly.
+//! then tested as [`Disturbance::first_met`] does: the first bit of a path that is set says the same, exactly.
 
 use crate::{
     disturbance::{Disturbance, Obstacle},
@@ -51,19 +51,26 @@ impl Encounters {
         Self { words }
     }
 
-    /// Whether a segment between the points in `path`, one path's, met it. Where these are [`WORD`] or fewer they are
-    /// points of one word; else they begin with a word.
+    /// How many points of those in `path`, one path's, come before the end of its first segment that met it; `None` where
+    /// none did. Where the points are [`WORD`] or fewer they are points of one word; else they begin with a word.
     #[inline]
-    pub(crate) fn any(&self, path: Range<usize>) -> bool {
+    pub(crate) fn first(&self, path: Range<usize>) -> Option<usize> {
         let (word, shift) = (path.start / WORD, path.start % WORD);
         // No segment ends at the first point.
         let segments = path.len().saturating_sub(1);
         if segments < WORD {
-            return (self.words[word] >> shift >> 1) & ((1 << segments) - 1) != 0;
+            let bits = (self.words[word] >> shift >> 1) & ((1 << segments) - 1);
+            return (bits != 0).then(|| bits.trailing_zeros() as usize + 1);
         }
+        let first = self.words[word] & !1;
         let whole = path.end / WORD;
         let rest = self.words[whole] & ((1 << (path.end % WORD)) - 1);
-        self.words[word] >> 1 != 0 || self.words[word + 1..whole].iter().any(|&bits| bits != 0) || rest != 0
+        let words = std::iter::once(first).chain(self.words[word + 1..whole].iter().copied()).chain([rest]);
+        let starts = (0..).step_by(WORD);
+        words
+            .zip(starts)
+            .find(|&(bits, _)| bits != 0)
+            .map(|(bits, start)| start + bits.trailing_zeros() as usize)
     }
 }
 
@@ -300,10 +307,10 @@ mod tests {
             pulp::Scalar.vectorize(Part { look: &look, first: 0, words: &mut plain });
             assert_eq!(plain, found.words, "case {case}");
             for path in paths {
-                let is_concerned = disturbance.concerns(&points[path.clone()]);
-                assert_eq!(found.any(path.clone()), is_concerned, "case {case}: {path:?}");
-                concerned += u32::from(is_concerned);
-                left += u32::from(!is_concerned);
+                let first = disturbance.first_met(&points[path.clone()]);
+                assert_eq!(found.first(path.clone()), first, "case {case}: {path:?}");
+                concerned += u32::from(first.is_some());
+                left += u32::from(first.is_none());
             }
         }
         assert!(concerned > 5000 && left > 5000, "{concerned} {left}");
@@ -319,13 +326,13 @@ mod tests {
                 words[i / WORD] &= !(1 << (i % WORD));
             }
             let mut encounters = Encounters { words };
-            assert!(!encounters.any(start..start + length), "{start} {length}");
+            assert_eq!(encounters.first(start..start + length), None, "{start} {length}");
             for i in start + 1..start + length {
                 encounters.words[i / WORD] |= 1 << (i % WORD);
-                assert!(encounters.any(start..start + length), "{start} {length}: {i}");
+                assert_eq!(encounters.first(start..start + length), Some(i - start), "{start} {length}: {i}");
                 encounters.words[i / WORD] &= !(1 << (i % WORD));
             }
         }
-        assert!(!Encounters { words: vec![u64::MAX] }.any(0..0), "no path has no segment");
+        assert_eq!(Encounters { words: vec![u64::MAX] }.first(0..0), None, "no path has no segment");
     }
 }

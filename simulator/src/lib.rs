@@ -19,6 +19,7 @@ pub mod pool;
 pub mod records;
 pub mod service;
 pub mod simulation;
+pub mod split;
 mod streams;
 pub mod tracer;
 pub mod trail;

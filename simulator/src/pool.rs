@@ -169,10 +169,11 @@ impl PathPool {
         Encounters::find(disturbance, &self.vertices.storage)
     }
 
-    /// Whether the path in `slot` is among those of `encounters`; none is where there is no path.
+    /// How many points of the path in `slot` come before the end of its first segment among `encounters`; `None` where
+    /// none is.
     #[inline]
-    pub(crate) fn is_among(&self, slot: u32, encounters: &Encounters) -> bool {
-        encounters.any(self.trails[slot as usize].range())
+    pub(crate) fn first_met(&self, slot: u32, encounters: &Encounters) -> Option<usize> {
+        encounters.first(self.trails[slot as usize].range())
     }
 
     /// Rays that the path in `slot` took; 0 where there is no path.

@@ -72,15 +72,7 @@ impl Simulation {
 
     /// [`Simulation::reloaded`], or `None` soon after it was cancelled.
     pub fn reloaded_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        let mut next = Self::new_unless(scene, cancel)?;
-        let names = |scene: &Scene| scene.lights.iter().map(|light| light.name.clone()).collect::<Vec<_>>();
-        let (old, new) = (&self.scene, &next.scene);
-        if names(old) == names(new) && old.streaming.pool_paths == new.streaming.pool_paths {
-            let emitters = Arc::new(self.emitters.with_scene(new));
-            next.tracer = Tracer::new(Arc::clone(new), Arc::clone(&next.owners), Arc::clone(&emitters));
-            next.emitters = emitters;
-        }
-        Some(next)
+        Some(Self::new_unless(scene, cancel)?.with_split_of(self))
     }
 
     /// A ledger with an empty pool.
@@ -103,7 +95,7 @@ impl Simulation {
                 .par_iter()
                 .map_init(Wave::default, |wave, task| {
                     let mut batch = PathBatch::default();
-                    self.tracer.trace(&task.draws, wave, &mut batch);
+                    self.tracer.resume(&task.draws, &task.begun, wave, &mut batch);
                     batch
                 })
                 .collect();

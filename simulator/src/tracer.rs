@@ -3,6 +3,14 @@
 //! Source: METHODS of paper A §0.5 and §0.7.1; every impact deposits what leaves the surface, flux · albedo, on the
 //! owner of the hit. Survival is decided by the albedo alone, never by the light's colour.
 
+mod batch;
+mod beginning;
+mod wave;
+
+pub use batch::{Draw, Path, PathBatch};
+pub use beginning::Beginnings;
+pub use wave::Wave;
+
 use crate::{
     counters::Counters,
     emitters::{Emitters, LightSlots},
@@ -15,12 +23,9 @@ use photonstream_scene::{
     Geometry, Scene, Side, Sides,
     bvh::{Hit, Ray},
 };
-use photonstream_shading::{
-    sampling::{self, Vectors},
-    sobol::SampleBlock,
-    surface,
-};
+use photonstream_shading::{sampling, surface};
 use std::sync::Arc;
+use wave::{Photon, Point};
 
 /// Highest probability to survive a bounce. A path in a closed scene of albedo 1 would never end; here its weight grows
 /// by 1/0.999 a bounce until it is cut and counted.
@@ -42,80 +47,6 @@ struct Reflection {
     albedo: Vec3,
     survival: f32,
     sides: Sides,
-}
-
-/// Which sample of its light a path takes: that of its slot, and which time round the slots of the light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Draw {
-    /// The slot; all slots of a batch belong to one light.
-    pub slot: u32,
-    /// Slot i of a light with n slots takes sample i + `generation` · n: 0 always replays the same samples, counting it
-    /// up streams through the sequence.
-    pub generation: u32,
-}
-
-/// Finished paths, in the order in which they were asked for.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PathBatch {
-    /// The slot of each path.
-    pub slots: Vec<u32>,
-    /// Number of deposits of each path.
-    pub lengths: Vec<u16>,
-    /// The deposits of all paths, one after another.
-    pub deposits: Vec<Deposit>,
-    /// Number of points of each path.
-    pub point_counts: Vec<u16>,
-    /// The points of all paths, one after another.
-    pub vertices: Vec<Vertex>,
-    /// Barycentric coordinates of each point that is a hit.
-    pub uvs: Vec<[f32; 2]>,
-    /// What happened on the way.
-    pub counters: Counters,
-}
-
-impl PathBatch {
-    /// Empties the batch, keeping its memory.
-    pub fn clear(&mut self) {
-        self.slots.clear();
-        self.lengths.clear();
-        self.deposits.clear();
-        self.point_counts.clear();
-        self.vertices.clear();
-        self.uvs.clear();
-        self.counters = Counters::default();
-    }
-
-    /// Each path.
-    pub fn paths(&self) -> impl Iterator<Item = Path<'_>> {
-        let (mut deposits, mut vertices, mut uvs) = (&self.deposits[..], &self.vertices[..], &self.uvs[..]);
-        self.slots.iter().zip(&self.lengths).zip(&self.point_counts).map(
-            move |((&slot, &length), &points)| Path {
-                slot,
-                deposits: take(&mut deposits, length),
-                vertices: take(&mut vertices, points),
-                uvs: take(&mut uvs, points),
-            },
-        )
-    }
-}
-
-fn take<'a, T>(rest: &mut &'a [T], count: u16) -> &'a [T] {
-    let (first, tail) = rest.split_at(usize::from(count));
-    *rest = tail;
-    first
-}
-
-/// A finished path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Path<'a> {
-    /// Its slot.
-    pub slot: u32,
-    /// What it left on its way.
-    pub deposits: &'a [Deposit],
-    /// The points it passed; none where its light sent nothing.
-    pub vertices: &'a [Vertex],
-    /// Barycentric coordinates of each point that is a hit.
-    pub uvs: &'a [[f32; 2]],
 }
 
 /// Sees what a tracer does; `()` sees nothing and costs nothing.
@@ -153,14 +84,29 @@ impl Tracer {
         self.trace_watched(draws, wave, batch, &mut ());
     }
 
+    /// [`Tracer::trace`] of paths of which the first points are known: the same paths, to the last bit, with fewer rays.
+    pub fn resume(&self, draws: &[Draw], begun: &Beginnings, wave: &mut Wave, batch: &mut PathBatch) {
+        self.follow(draws, begun, wave, batch, &mut ());
+    }
+
     /// [`Tracer::trace`], with every ray and hit shown to `watcher`.
-    ///
-    /// All paths of the batch advance together, a bounce at a time and within it a step at a time: the processor works on
-    /// the rays of several paths at once, where it would wait for each ray's hit, and on eight samples in one
-    /// instruction.
     pub(crate) fn trace_watched(
         &self,
         draws: &[Draw],
+        wave: &mut Wave,
+        batch: &mut PathBatch,
+        watcher: &mut impl Watcher,
+    ) {
+        self.follow(draws, &Beginnings::default(), wave, batch, watcher);
+    }
+
+    /// All paths of the batch advance together, a bounce at a time and within it a step at a time: the processor works on
+    /// the rays of several paths at once, where it would wait for each ray's hit, and on eight samples in one
+    /// instruction.
+    fn follow(
+        &self,
+        draws: &[Draw],
+        begun: &Beginnings,
         wave: &mut Wave,
         batch: &mut PathBatch,
         watcher: &mut impl Watcher,
@@ -171,20 +117,21 @@ impl Tracer {
         batch.counters.paths += draws.len() as u64;
         let light = self.emitters.light_of(first.slot);
         debug_assert!(draws.iter().all(|d| light.slots.contains(&d.slot)), "a batch belongs to one light");
-        self.emit(light, draws, wave);
-        for _ in 0..MAX_DEPOSITS {
-            if wave.photons.is_empty() {
+        self.emit(light, draws, begun, wave);
+        for hits in 1..=MAX_DEPOSITS as u32 {
+            if wave.photons.is_empty() && wave.waiting.is_empty() {
                 break;
             }
-            self.advance(wave, &mut batch.counters, watcher);
+            self.advance(hits, wave, &mut batch.counters, watcher);
         }
         batch.counters.truncated += wave.photons.len() as u64;
         wave.collect(draws.len(), batch);
     }
 
-    /// Fills the wave with the photons that leave the light.
-    fn emit(&self, light: &LightSlots, draws: &[Draw], wave: &mut Wave) {
+    /// Fills the wave with the photons that leave the light, or go on from what is known of their paths.
+    fn emit(&self, light: &LightSlots, draws: &[Draw], begun: &Beginnings, wave: &mut Wave) {
         wave.photons.clear();
+        wave.waiting.clear();
         wave.events.clear();
         wave.points.clear();
         let shape = &self.scene.lights[light.light.0 as usize].light.shape;
@@ -204,12 +151,17 @@ impl Tracer {
             samples.skip_dimension();
         }
         wave.samples.restart(samples.dimension());
+        let mut known = begun.paths();
         for path in 0..draws.len() as u32 {
+            let known = known.next().unwrap_or_default();
             let i = path as usize;
             let u_position = if area { [wave.directions.x[i], wave.directions.y[i]] } else { [0.0; 2] };
             let emission = shape.emit_with(self.scene.bounds, [wave.first[i], wave.second[i]], u_position);
             let throughput = light.birth * emission.weight;
-            if throughput != Vec3::ZERO {
+            if !known.is_empty() {
+                let waiting = self.go_on(path, throughput, known, samples.get(i), wave);
+                wave.waiting.push(waiting);
+            } else if throughput != Vec3::ZERO {
                 let ray =
                     Ray { origin: emission.origin, direction: emission.direction, t_max: f32::INFINITY };
                 wave.photons.push(Photon { path, throughput, ray });
@@ -217,11 +169,13 @@ impl Tracer {
                 wave.samples.push(samples.get(i));
             }
         }
+        wave.waiting.sort_unstable_by_key(|waiting| u32::MAX - waiting.hits);
         wave.spare_samples = samples;
     }
 
-    /// One bounce: every photon of the wave to its hit, and those that survive it to their next ray.
-    fn advance(&self, wave: &mut Wave, counters: &mut Counters, watcher: &mut impl Watcher) {
+    /// One bounce: every photon of the wave to its hit, the one with the number `hits` from 1, and those that survive it to
+    /// their next ray.
+    fn advance(&self, hits: u32, wave: &mut Wave, counters: &mut Counters, watcher: &mut impl Watcher) {
         wave.hits.clear();
         for photon in &wave.photons {
             watcher.ray(&photon.ray);
@@ -252,6 +206,11 @@ impl Tracer {
             survivors += 1;
         }
         wave.photons.truncate(survivors);
+        while let Some(waiting) = wave.waiting.pop_if(|waiting| waiting.hits == hits) {
+            wave.photons.push(waiting.photon);
+            wave.directions.push(waiting.normal);
+            surviving_samples.push(waiting.sample);
+        }
         wave.spare_samples = std::mem::replace(&mut wave.samples, surviving_samples);
 
         wave.samples.next_2d(&mut wave.first, &mut wave.second);
@@ -322,82 +281,4 @@ impl Tracer {
         let ray = Ray { origin, direction: Vec3::ZERO, t_max: f32::INFINITY };
         Some((Photon { path: photon.path, throughput, ray }, normal))
     }
-}
-
-/// A path, a point that it passed, and its barycentric coordinates.
-type Point = (u32, Vertex, [f32; 2]);
-
-/// A photon on its way.
-#[derive(Clone, Copy, Debug)]
-struct Photon {
-    /// Which path of the batch it is.
-    path: u32,
-    throughput: Vec3,
-    ray: Ray,
-}
-
-/// Photons that advance together, and the memory they need: a tracer thread keeps one for all its work.
-#[derive(Debug, Default)]
-pub struct Wave {
-    photons: Vec<Photon>,
-    samples: SampleBlock,
-    spare_samples: SampleBlock,
-    hits: Vec<Option<Hit>>,
-    /// Random numbers: for survival, and the first of a direction.
-    first: Vec<f32>,
-    second: Vec<f32>,
-    /// Normals, which become directions.
-    directions: Vectors,
-    /// Deposits of all paths as they happened.
-    events: Vec<(u32, Deposit)>,
-    /// Points of all paths as they were passed.
-    points: Vec<Point>,
-    /// Where each path's deposits go next.
-    places: Vec<u32>,
-}
-
-impl Wave {
-    /// Sorts deposits and points by path, each path's in their order, into the batch.
-    fn collect(&mut self, count: usize, batch: &mut PathBatch) {
-        let paths = self.events.iter().map(|event| event.0);
-        count_by_path(count, paths, &mut self.places, &mut batch.lengths);
-        batch.deposits.resize(self.events.len(), Deposit::default());
-        for &(path, deposit) in &self.events {
-            batch.deposits[next_place(&mut self.places, path)] = deposit;
-        }
-        let paths = self.points.iter().map(|point| point.0);
-        count_by_path(count, paths, &mut self.places, &mut batch.point_counts);
-        batch.vertices.resize(self.points.len(), Vertex::default());
-        batch.uvs.resize(self.points.len(), [0.0; 2]);
-        for &(path, vertex, uv) in &self.points {
-            let place = next_place(&mut self.places, path);
-            (batch.vertices[place], batch.uvs[place]) = (vertex, uv);
-        }
-        batch.counters.deposits += self.events.len() as u64;
-    }
-}
-
-/// Counts how often each path is named, and where the first of each belongs when all are sorted by path.
-fn count_by_path(
-    paths: usize,
-    named: impl Iterator<Item = u32>,
-    places: &mut Vec<u32>,
-    counts: &mut Vec<u16>,
-) {
-    counts.clear();
-    counts.resize(paths, 0);
-    named.for_each(|path| counts[path as usize] += 1);
-    places.clear();
-    places.extend(counts.iter().scan(0, |end, &count| {
-        let start = *end;
-        *end += u32::from(count);
-        Some(start)
-    }));
-}
-
-#[inline]
-fn next_place(places: &mut [u32], path: u32) -> usize {
-    let place = &mut places[path as usize];
-    *place += 1;
-    *place as usize - 1
 }

@@ -7,7 +7,7 @@
 
 use super::{FILLED, Ledger, STALE, UNDER_WAY};
 use crate::{
-    change::{LightRevision, obstacle, reach_of, reflects_alike},
+    change::{LightRevision, at_most_255, obstacle, reach_of, reflects_alike},
     disturbance::Disturbance,
     flux::Deposit,
     simulation::Simulation,
@@ -135,9 +135,13 @@ impl Ledger {
             {
                 let mark = self.slots[old_slot as usize];
                 let Some(path) = self.pool.whole_path(old_slot) else { continue };
-                let is_stale =
-                    mark & STALE != 0 || revision.stale || migration.disturbance.concerns(path.vertices);
-                moved.take(migration, simulation, &path, revision.factor);
+                let before = (mark & STALE != 0).then(|| self.kept[old_slot as usize]);
+                let by_light = revision.stale.then_some(0);
+                let on_the_way = migration.disturbance.first_met(path.vertices).map(at_most_255);
+                let kept = [before, by_light, on_the_way].into_iter().flatten().min();
+                let is_stale = kept.is_some();
+                let alike = moved.take(migration, simulation, &path, revision.factor);
+                next.kept[slot as usize] = kept.unwrap_or(0).min(at_most_255(alike));
                 let birth_ms = self.pool.birth_ms(old_slot).unwrap_or_default();
                 next.pool.put(&moved.path(slot), birth_ms);
                 next.slots[slot as usize] = FILLED | if is_stale { STALE } else { 0 };
@@ -180,12 +184,20 @@ impl Moved {
         self.uvs.push(uv);
     }
 
-    fn take(&mut self, migration: &Migration, simulation: &Simulation, path: &Path<'_>, factor: Vec3) {
+    /// Takes over a path, and returns how many of its first points it still has.
+    fn take(
+        &mut self,
+        migration: &Migration,
+        simulation: &Simulation,
+        path: &Path<'_>,
+        factor: Vec3,
+    ) -> usize {
         self.deposits.clear();
         self.vertices.clear();
         self.uvs.clear();
         let mut rest = path.deposits.iter();
-        for (vertex, &uv) in path.vertices.iter().zip(path.uvs) {
+        let mut alike = path.vertices.len();
+        for (index, (vertex, &uv)) in path.vertices.iter().zip(path.uvs).enumerate() {
             let Event::Hit { triangle, side, deposited } = vertex.event() else {
                 self.push(*vertex, uv);
                 continue;
@@ -194,6 +206,7 @@ impl Moved {
             let number = migration.triangles[triangle as usize];
             // Light on what is gone is gone; the path is stale then.
             if number == GONE {
+                alike = alike.min(index);
                 continue;
             }
             let Some(deposit) = deposit else {
@@ -205,12 +218,16 @@ impl Moved {
             } else {
                 match simulation.owners.owner(number, side, uv[0], uv[1]) {
                     Some(owner) => owner.0,
-                    None => continue,
+                    None => {
+                        alike = alike.min(index);
+                        continue;
+                    }
                 }
             };
             let deposit = Deposit { vsl: owner, ..*deposit };
             self.deposits.push(if factor == Vec3::ONE { deposit } else { deposit.scaled(factor) });
             self.push(vertex.renumbered(number), uv);
         }
+        alike
     }
 }

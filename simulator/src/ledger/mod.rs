@@ -11,6 +11,7 @@ mod migration;
 mod queue;
 mod reading;
 mod refinement;
+mod resplit;
 mod slots_in_use;
 
 pub use migration::Migration;
@@ -21,7 +22,7 @@ use crate::{
     emitters::Emitters,
     pool::PathPool,
     simulation::Simulation,
-    tracer::{Draw, PathBatch},
+    tracer::{Beginnings, Draw, PathBatch},
 };
 use glam::Vec3;
 use photonstream_scene::{Sampling, Scene};
@@ -37,12 +38,14 @@ use std::{
 pub const PATHS_PER_TASK: u32 = 512;
 
 /// Slots to be traced.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Task {
     /// Place in the order of all tasks.
     pub number: u64,
     /// The paths; their slots belong to one light.
     pub draws: Vec<Draw>,
+    /// What is still true of the paths that are there: to trace anew is to get the same.
+    pub begun: Beginnings,
     /// The version of the scene to trace them in: counts the changes of the ledger.
     pub version: u64,
     light: usize,
@@ -81,6 +84,8 @@ pub struct Ledger {
     pool: PathPool,
     /// What is known of each slot.
     slots: Vec<u8>,
+    /// How many first points of each stale path are still true.
+    kept: Vec<u8>,
     /// How often each slot was given out, for fresh samples.
     given: Vec<u32>,
     /// Slots in use of each light, from its first.
@@ -117,6 +122,7 @@ impl Ledger {
         let mut ledger = Self {
             pool: PathPool::new(columns, vsls),
             slots: vec![0; slots],
+            kept: vec![0; slots],
             given: vec![0; if is_fresh { slots } else { 0 }],
             active: emitters.lights.iter().map(|l| l.slots.end - l.slots.start).collect(),
             queue: Queue::new(&emitters),
@@ -191,24 +197,34 @@ impl Ledger {
         for (index, light) in self.emitters.lights.iter().enumerate() {
             let first = light.slots.start as usize;
             let (pool, count) = (&self.pool, self.active[index] as usize);
-            let look = |(marks, start): (&mut [u8], usize)| {
+            let look = |(marks, kept, start): (&mut [u8], &mut [u8], usize)| {
                 let mut found = Found::default();
-                for (mark, slot) in marks.iter_mut().zip(start as u32..) {
-                    if *mark & (FILLED | STALE) != FILLED {
+                for ((mark, kept), slot) in marks.iter_mut().zip(kept).zip(start as u32..) {
+                    if *mark & FILLED == 0 {
                         continue;
                     }
-                    let is_stale = concerned.contains(index, slot);
-                    *mark |= if is_stale { STALE } else { 0 };
-                    found.stale += u32::from(is_stale);
-                    found.kept_rays += if is_stale { 0 } else { pool.rays(slot) };
+                    match (concerned.kept(index, slot), *mark & STALE != 0) {
+                        (None, true) => {}
+                        (None, false) => found.kept_rays += pool.rays(slot),
+                        (Some(points), true) => *kept = points.min(*kept),
+                        (Some(points), false) => {
+                            *mark |= STALE;
+                            *kept = points;
+                            found.stale += 1;
+                        }
+                    }
                 }
                 found
             };
-            let parts = self.slots[first..first + count].par_chunks_mut(PATHS_LOOKED_AT).enumerate();
-            let found = parts.map(|(part, marks)| look((marks, first + part * PATHS_LOOKED_AT))).reduce(
-                Found::default,
-                |a, b| Found { stale: a.stale + b.stale, kept_rays: a.kept_rays + b.kept_rays },
-            );
+            let slots = first..first + count;
+            let parts = self.slots[slots.clone()].par_chunks_mut(PATHS_LOOKED_AT);
+            let parts = parts.zip(self.kept[slots].par_chunks_mut(PATHS_LOOKED_AT)).enumerate();
+            let found = parts
+                .map(|(part, (marks, kept))| look((marks, kept, first + part * PATHS_LOOKED_AT)))
+                .reduce(Found::default, |a, b| Found {
+                    stale: a.stale + b.stale,
+                    kept_rays: a.kept_rays + b.kept_rays,
+                });
             self.stale_paths += found.stale;
             self.savings.retraced_paths += u64::from(found.stale);
             self.savings.rays_saved += found.kept_rays;
@@ -272,8 +288,22 @@ impl Ledger {
             marks[slot as usize] |= UNDER_WAY;
             slots.push(slot);
         })?;
+        let begun = self.beginnings(&slots);
         let draws = slots.into_iter().map(|slot| self.draw(slot)).collect();
-        Some(self.task(light, draws, false))
+        Some(Task { begun, ..self.task(light, draws, false) })
+    }
+
+    /// What is still true of the stale paths in `slots`: of a replayed sample the path is the same again up to what it met.
+    fn beginnings(&mut self, slots: &[u32]) -> Beginnings {
+        let mut begun = Beginnings::default();
+        let is_stale = |slot: u32| self.slots[slot as usize] & STALE != 0;
+        if self.sampling == Sampling::Replay && slots.iter().any(|&slot| is_stale(slot)) {
+            for &slot in slots {
+                let points = if is_stale(slot) { self.kept[slot as usize] } else { 0 };
+                self.savings.rays_saved += begun.push(self.pool.whole_path(slot), points);
+            }
+        }
+        begun
     }
 
     /// The next task of a stream of fresh samples: of the light that is behind, its oldest paths.
@@ -310,7 +340,7 @@ impl Ledger {
         let (number, version, structure) = (self.next_task, self.version, self.structure);
         self.next_task += 1;
         self.under_way.push_back(version);
-        Task { number, draws, version, light, beyond_pool, structure }
+        Task { number, draws, begun: Beginnings::default(), version, light, beyond_pool, structure }
     }
 
     /// Takes in the finished batch of a task, and of those that waited for it. Returns batches whose memory is free.
@@ -361,14 +391,15 @@ impl Ledger {
                 continue;
             }
             let later = self.changes.iter().filter(|(version, _)| *version > task.version);
-            let is_stale =
-                later.map(|(_, change)| change).any(|change| change.concerns(task.light, path.vertices));
+            let kept = later.filter_map(|(_, change)| change.kept(task.light, path.vertices)).min();
+            let is_stale = kept.is_some();
             self.empty -= u32::from(mark & FILLED == 0);
             self.stale_paths -= u32::from(mark & STALE != 0);
             self.stale_paths += u32::from(is_stale);
             self.pool.put(&path, birth_ms);
             self.slots[path.slot as usize] = FILLED | if is_stale { STALE } else { 0 };
-            if is_stale {
+            if let Some(kept) = kept {
+                self.kept[path.slot as usize] = kept;
                 self.savings.retraced_paths += 1;
                 self.queue.push(task.light, path.slot, self.weight(column, path.slot));
                 is_queue_longer = true;

@@ -116,6 +116,8 @@ struct Progress {
     stepping: bool,
     /// Something differs from the last published frame.
     changed: bool,
+    /// Paths were traced since it was last decided how the pool is split.
+    split_is_due: bool,
     next_frame: Instant,
     /// When the last frame was shown, or the first change after it came.
     shown_at: Instant,
@@ -154,6 +156,7 @@ impl LedgerActor {
             paused: false,
             stepping: false,
             changed: true,
+            split_is_due: true,
             next_frame: started + period(&self.simulation),
             shown_at: started,
             frames: 0,
@@ -207,6 +210,9 @@ impl LedgerActor {
 
     /// Keeps the tracers busy. False if there are none any more.
     fn hand_out(&self, progress: &mut Progress) -> bool {
+        if !progress.paused && !self.is_at_limit(progress) {
+            progress.follow_variance();
+        }
         let most = 2 * self.threads as u64 + 2;
         while progress.ledger.in_flight() < most && (!progress.paused || progress.stepping) {
             // An edit is followed to its end, whatever the limit.
@@ -312,6 +318,9 @@ impl Progress {
     /// Goes on in a new version of the scene. Batches under way stay those of the old one.
     fn edit(&mut self, version: Version) {
         let Version { simulation, still, received_ns, time_s, only_whole } = version;
+        let follows_variance = simulation.scene.streaming.latency_ms > 0.0;
+        let simulation =
+            if follows_variance { simulation.with_split_of(&self.simulation) } else { simulation };
         if Arc::ptr_eq(&simulation.owners, &self.simulation.owners) {
             let is_still = Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry);
             self.places += u64::from(!is_still);
@@ -342,7 +351,27 @@ impl Progress {
             self.waiting_since_ns = Some(received_ns);
             self.paths_before_change = self.ledger.counters().paths;
         }
+        // A power alone moves no path.
+        self.split_is_due |= !self.ledger.is_settled();
         self.note_whole_light();
+        self.changed = true;
+    }
+
+    /// Where the pool follows a latency target, splits it by measured variance: once after each change that was traced,
+    /// as soon as its light is whole, so that a still scene comes to rest.
+    fn follow_variance(&mut self) {
+        let scene = &self.simulation.scene;
+        if !self.split_is_due || scene.streaming.latency_ms <= 0.0 || !self.ledger.is_settled() {
+            return;
+        }
+        self.split_is_due = false;
+        let Some(slots) = self.ledger.better_split(scene) else { return };
+        let next = self.simulation.with_split(&slots);
+        // Its place is taken at once.
+        let old = std::mem::replace(&mut self.ledger, next.ledger());
+        self.ledger = old.resplit(&self.simulation, &next);
+        self.tracer = Arc::new(next.tracer.clone());
+        self.simulation = next;
         self.changed = true;
     }
 

@@ -18,7 +18,7 @@ pub(super) struct Work {
 pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>) {
     let mut wave = Wave::default();
     while let Ok(Work { tracer, task, mut batch }) = work.recv() {
-        tracer.trace(&task.draws, &mut wave, &mut batch);
+        tracer.resume(&task.draws, &task.begun, &mut wave, &mut batch);
         if ledger.send(ToLedger::Finished(Box::new((task, batch)))).is_err() {
             return;
         }

@@ -9,4 +9,5 @@ mod reload;
 mod selective;
 mod service;
 mod service_edits;
+mod split;
 mod support;

@@ -103,8 +103,8 @@ fn assert_is_traced_anew(ledger: &Ledger, simulation: &Simulation, what: &str) {
 }
 
 /// N = 1 000 changes, seed 9, of place, turn, size, colour, light, number of lights and paths, objects added and removed;
-/// tasks are under way at each, and up to 12 are traced between two; every 25th is traced to its end. Columns of their own
-/// and a shared one; 1 and 4 threads. Exact: no tolerance.
+/// tasks are under way at each, and up to 12 are traced between two; every 25th is traced to its end, and the pool then
+/// split by variance. Columns of their own and a shared one; 1 and 4 threads. Exact: no tolerance.
 #[test]
 fn a_thousand_changes_end_in_the_light_of_a_full_trace() {
     for (columns, threads) in [(8, 1), (8, 4), (2, 1), (2, 4)] {
@@ -114,6 +114,7 @@ fn a_thousand_changes_end_in_the_light_of_a_full_trace() {
             let mut simulation = Simulation::new(room.scene());
             let mut ledger = simulation.fill();
             let mut random = Random(9);
+            let mut splits = 0;
             for step in 1..=1000 {
                 let under_way: Vec<_> =
                     std::iter::from_fn(|| ledger.next_task()).take(random.below(3)).collect();
@@ -130,8 +131,15 @@ fn a_thousand_changes_end_in_the_light_of_a_full_trace() {
                 if step % 25 == 0 {
                     simulation.advance(&mut ledger, u64::MAX);
                     assert_is_traced_anew(&ledger, &simulation, &format!("step {step}, {columns} columns"));
+                    if let Some(slots) = ledger.better_split(&simulation.scene) {
+                        let next = simulation.with_split(&slots);
+                        ledger = ledger.resplit(&simulation, &next);
+                        simulation = next;
+                        splits += 1;
+                    }
                 }
             }
+            assert!(splits >= 5, "{splits}");
         });
     }
 }
@@ -164,6 +172,47 @@ fn what_a_change_does_not_concern_is_not_traced_again() {
     let (moved, _) = stale_after(&|room| room.bulb = [0.5; 3]);
     let bulb = simulation.emitters.lights[0].slots.clone();
     assert_eq!(moved, bulb.end - bulb.start);
+}
+
+/// A stale path goes on from the last point before what it met: N = 40 random edits one after another, seed 3, up to two
+/// tasks traced between, so that paths are stale by several of them. Every batch is that of tracing its paths from their
+/// light, bit for bit, with fewer rays: the saved ones are counted, and none of the others.
+#[test]
+fn a_path_goes_on_from_where_it_met_the_change() {
+    let mut simulation = Simulation::new(first().scene());
+    let mut ledger = simulation.fill();
+    let mut random = Random(3);
+    let (mut rays, mut rays_from_light) = (0, 0);
+    for step in 0..40 {
+        let mut edit = simulation.scene.edit();
+        match step % 4 {
+            3 => _ = edit.set_light("bulb", &values(json!({ "position_m": random.place() }))).unwrap(),
+            2 => _ = edit.move_object("crate", &values(json!({ "rotation_deg": random.place() }))).unwrap(),
+            _ => _ = edit.move_object("ball", &values(json!({ "position_m": random.place() }))).unwrap(),
+        }
+        let next = simulation.with_scene(Arc::new(edit.finish()));
+        ledger.revise(&next, Change::between(&simulation, &next), None);
+        simulation = next;
+        let tasks = if step % 8 == 7 { usize::MAX } else { random.below(3) };
+        for _ in 0..tasks {
+            let saved = ledger.savings().rays_saved;
+            let Some(task) = ledger.next_task() else { break };
+            let saved = ledger.savings().rays_saved - saved;
+            let (mut batch, mut from_light) = (PathBatch::default(), PathBatch::default());
+            simulation.tracer.resume(&task.draws, &task.begun, &mut Wave::default(), &mut batch);
+            simulation.tracer.trace(&task.draws, &mut Wave::default(), &mut from_light);
+            rays += batch.counters.rays;
+            rays_from_light += from_light.counters.rays;
+            assert_eq!(batch.counters.rays + saved, from_light.counters.rays, "step {step}");
+            from_light.counters.rays = batch.counters.rays;
+            assert_eq!(batch, from_light, "step {step}");
+            ledger.apply(task, batch, 0);
+        }
+    }
+    simulation.advance(&mut ledger, u64::MAX);
+    assert_is_traced_anew(&ledger, &simulation, "the end");
+    println!("{rays} of {rays_from_light} rays");
+    assert!(rays * 20 < rays_from_light * 19, "{rays} of {rays_from_light} rays");
 }
 
 /// An edit of the running scene: the same selection as for a new text.

@@ -66,7 +66,7 @@ impl Service {
 }
 
 /// The first frame that shows so many paths and says that the light has converged.
-fn after(subscriber: &mut Subscriber, paths: u64) -> VslFrame {
+pub(crate) fn after(subscriber: &mut Subscriber, paths: u64) -> VslFrame {
     let deadline = std::time::Instant::now() + PATIENCE;
     while std::time::Instant::now() < deadline {
         let new = subscriber.read().unwrap() == Reading::New;
