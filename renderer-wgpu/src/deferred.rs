@@ -20,12 +20,14 @@ pub(crate) struct DirectKind {
     pub(crate) delta_lights: bool,
     pub(crate) area_lights: bool,
     pub(crate) shadows: bool,
+    /// Whether maps name triangles.
+    pub(crate) named: bool,
 }
 
 impl DirectKind {
-    pub(crate) fn of(features: &Features, shadows: bool) -> Self {
+    pub(crate) fn of(features: &Features, shadows: bool, named: bool) -> Self {
         let delta_lights = features.point_lights + features.spot_lights + features.directional_lights > 0;
-        Self { delta_lights, area_lights: features.area_lights > 0, shadows }
+        Self { delta_lights, area_lights: features.area_lights > 0, shadows, named }
     }
 }
 
@@ -99,6 +101,7 @@ impl Deferred {
         scope: &mut Scope<'_>,
         targets: &Targets,
         maps: &ShadowMaps,
+        geometry: &Geometry,
         kind: DirectKind,
     ) {
         if self.direct.as_ref().is_none_or(|(k, _)| *k != kind) {
@@ -106,6 +109,7 @@ impl Deferred {
                 ("DELTA_LIGHTS", f64::from(kind.delta_lights)),
                 ("AREA_LIGHTS", f64::from(kind.area_lights)),
                 ("SHADOWS", f64::from(kind.shadows)),
+                ("NAMED_MAPS", f64::from(kind.named)),
             ];
             self.direct =
                 Some((kind, pipelines::covering(scope.gpu, &shader::DIRECT, "arrive", HDR, &constants)));
@@ -118,6 +122,9 @@ impl Deferred {
             whole(&maps.views),
             texture(&maps.maps),
             Some(wgpu::BindingResource::Sampler(&maps.sampler)),
+            texture(&maps.names),
+            if geometry.is_readable(scope.gpu) { whole(&geometry.corners) } else { whole(&maps.lights) },
+            Some(wgpu::BindingResource::Sampler(&maps.nearest)),
         ];
         let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
         let edge = scope.alone("direct light");

@@ -101,7 +101,13 @@ impl Renderer {
         }
         if view.needs_direct() && done.is_stale(Stage::Direct, view, versions) {
             let with_maps = view.shadows == Shadows::Maps;
-            let table = LightTable::new(&scene.lights, scene.bounds, view.light_samples, with_maps);
+            let table = LightTable::new(
+                &scene.lights,
+                scene.bounds,
+                view.light_samples,
+                with_maps,
+                scene.geometry.is_readable(&self.gpu),
+            );
             let (new_views, _) = self.maps.update(&self.gpu, table);
             if with_maps && (new_views || done.is_stale(Stage::Maps, view, versions)) {
                 self.maps.encode(scope.gpu, &mut scope.encoder, &scene.geometry, scope.timer);
@@ -124,8 +130,8 @@ impl Renderer {
                 drawn.light_rays = traced.rays;
                 drawn.take(traced, "direct light, rays");
             } else {
-                let kind = DirectKind::of(&scene.features, with_maps);
-                self.deferred.encode_direct(&mut scope, targets, &self.maps, kind);
+                let kind = DirectKind::of(&scene.features, with_maps, self.maps.is_named());
+                self.deferred.encode_direct(&mut scope, targets, &self.maps, &scene.geometry, kind);
             }
         }
         let lights_needed = view.needs_indirect() || view.needs_owner() || view.show == Show::Discs;

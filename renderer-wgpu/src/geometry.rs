@@ -12,7 +12,7 @@ use wgpu::BufferUsages;
 /// The triangles of a scene on the device, and what is known of its objects.
 #[derive(Debug)]
 pub(crate) struct Geometry {
-    corners: wgpu::Buffer,
+    pub(crate) corners: wgpu::Buffer,
     /// Albedo, sides and emission of each object.
     pub(crate) objects: wgpu::Buffer,
     object_table: Vec<ObjectUniform>,
@@ -62,7 +62,7 @@ impl Geometry {
             BufferUsages::STORAGE,
         );
         gpu.queue.write_buffer(&objects, 0, bytemuck::cast_slice(&object_table));
-        let corners = buffer(gpu, "corners", bytes, BufferUsages::VERTEX);
+        let corners = buffer(gpu, "corners", bytes, BufferUsages::VERTEX | BufferUsages::STORAGE);
         let geometry = Self {
             corners,
             objects,
@@ -114,6 +114,11 @@ impl Geometry {
         }
         self.source = Arc::clone(&scene.geometry);
         Ok(changed)
+    }
+
+    /// Whether shaders can look triangles up by number.
+    pub(crate) fn is_readable(&self, gpu: &Gpu) -> bool {
+        self.corners.size() <= gpu.device.limits().max_storage_buffer_binding_size
     }
 
     /// Draws the objects that `sees` keeps (by centre and radius of their spheres), each `instances` times.

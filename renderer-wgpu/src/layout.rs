@@ -26,6 +26,13 @@ pub(crate) const NO_OWNER: u32 = u32::MAX;
 /// Texels by which a receiver is moved off its surface before it is looked up in a shadow map.
 pub(crate) const SHADOW_NORMAL_TEXELS: f32 = 2.0;
 
+/// Texels by which a plane lies off a receiver at least if it is to shadow the receiver beside its triangle: more than the
+/// neighbours of a fine curved surface bulge over each other.
+pub(crate) const COVERED_TEXELS: f32 = 1.0;
+
+/// Stands for the layer of a view whose map does not name triangles.
+pub(crate) const NO_LAYER: u32 = u32::MAX;
+
 const _: () = assert!(BATCH_LIGHTS as usize * size_of::<VslUniform>() <= crate::UNIFORM_BLOCK_BYTES as usize);
 
 /// What a composite shows, by number.
@@ -74,6 +81,7 @@ pub(crate) fn constants() -> String {
     float("MAX_FLUX", MAX_FLUX);
     float("STEEP_PIXELS", STEEP_PIXELS);
     float("SHADOW_NORMAL_TEXELS", SHADOW_NORMAL_TEXELS);
+    float("COVERED_TEXELS", COVERED_TEXELS);
     float("COMPATIBLE_COS", photonstream_renderer::owner::COMPATIBLE_COS);
     float("EPSILON_OF_ONE", f32::EPSILON);
     float("SQRT_3", 3f32.sqrt());
@@ -226,7 +234,7 @@ shared! {
         clip_from_world: [[f32; 4]; 4],
         texel: f32,
         parallel: u32,
-        pad_0: u32,
+        layer: u32,
         pad_1: u32,
     }
 }

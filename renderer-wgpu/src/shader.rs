@@ -15,6 +15,9 @@ const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
+const SHADOW_NAMED: &str = include_str!("../wgsl/shadow_named.wgsl");
+
+const RAYS_TRIANGLE: &str = include_str!("../wgsl/rays_triangle.wgsl");
 const RAYS_WALK: &str = include_str!("../wgsl/rays_walk.wgsl");
 const RAYS_PIXEL: &str = include_str!("../wgsl/rays_pixel.wgsl");
 
@@ -34,7 +37,7 @@ macro_rules! sources {
 sources! {
     GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION];
     SHADOW_MAP = "shadow_map" [];
-    DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW];
+    DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
     TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
@@ -47,12 +50,12 @@ sources! {
     COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     DISC = "disc" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
     RAYS_DIRECT = "rays_direct" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_INDIRECT = "rays_indirect" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, FRAME, VSL, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, FRAME, VSL, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
-    RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_WALK, RAYS_PIXEL];
+    RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL];
     PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];
 }
 

@@ -2,11 +2,13 @@
 
 use crate::{
     Gpu,
+    deferred::depth_test,
     geometry::{self, Geometry},
-    layout::{Corner, ShadowView},
+    layout::{Corner, NO_LAYER, ShadowView},
     pipelines::{self, Drawing},
     shader,
     shadow_views::LightTable,
+    targets::DEPTH,
     timer::Timer,
 };
 use wgpu::{BufferUsages, TextureUsages};
@@ -17,8 +19,12 @@ const VIEW_STRIDE: u64 = 256;
 /// The shadow maps of a scene's lights.
 #[derive(Debug)]
 pub(crate) struct ShadowMaps {
-    pipeline: wgpu::RenderPipeline,
+    /// Draws depths alone, biased: they are compared with receivers.
+    depths: wgpu::RenderPipeline,
+    /// Draws which triangles are nearest.
+    naming: wgpu::RenderPipeline,
     pub(crate) sampler: wgpu::Sampler,
+    pub(crate) nearest: wgpu::Sampler,
     /// The lights that shaders read.
     pub(crate) lights: wgpu::Buffer,
     /// The views that shaders read.
@@ -27,27 +33,38 @@ pub(crate) struct ShadowMaps {
     /// All maps, as layers.
     pub(crate) maps: wgpu::TextureView,
     texture: wgpu::Texture,
+    /// Which triangles lights without extent see, as layers.
+    pub(crate) names: wgpu::TextureView,
+    names_texture: wgpu::Texture,
     table: LightTable,
 }
 
 impl ShadowMaps {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let set = Drawing {
+        let depth = depth_test(true, wgpu::CompareFunction::Greater);
+        let naming = Drawing {
+            vertex: "corner",
+            fragment: Some("name"),
+            format: Some(NAMES),
+            corners: Some(Corner::layout()),
+            depth: Some(depth.clone()),
+            ..Drawing::default()
+        };
+        let depths = Drawing {
             vertex: "corner",
             corners: Some(Corner::layout()),
+            // Away from the light, which in reversed depth is down; more for slopes.
             depth: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: wgpu::StencilState::default(),
-                // Away from the light, which in reversed depth is down; more for slopes.
                 bias: wgpu::DepthBiasState { constant: -2, slope_scale: -1.5, clamp: 0.0 },
+                ..depth
             }),
             ..Drawing::default()
         };
-        let texture = maps_texture(gpu, 1, 1);
+        let texture = maps_texture(gpu, DEPTH, 1, 1);
+        let names_texture = maps_texture(gpu, NAMES, 1, 1);
         Self {
-            pipeline: pipelines::drawing(gpu, &shader::SHADOW_MAP, &set),
+            depths: pipelines::drawing(gpu, &shader::SHADOW_MAP, &depths),
+            naming: pipelines::drawing(gpu, &shader::SHADOW_MAP, &naming),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("shadow comparison"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -55,11 +72,17 @@ impl ShadowMaps {
                 compare: Some(wgpu::CompareFunction::GreaterEqual),
                 ..Default::default()
             }),
+            nearest: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("names of triangles"),
+                ..Default::default()
+            }),
             lights: geometry::buffer(gpu, "lights", 96, BufferUsages::STORAGE),
             views: geometry::buffer(gpu, "shadow views", 80, BufferUsages::STORAGE),
             drawn_views: geometry::buffer(gpu, "shadow views, drawn", VIEW_STRIDE, BufferUsages::UNIFORM),
             maps: layers(&texture),
             texture,
+            names: layers(&names_texture),
+            names_texture,
             table: LightTable::default(),
         }
     }
@@ -89,12 +112,23 @@ impl ShadowMaps {
             let count = table.views.len().max(1) as u32;
             let resolution = table.resolution.max(1);
             if self.texture.width() != resolution || self.texture.depth_or_array_layers() != count {
-                self.texture = maps_texture(gpu, resolution, count);
+                self.texture = maps_texture(gpu, DEPTH, resolution, count);
                 self.maps = layers(&self.texture);
+            }
+            // A place for one that is never looked up stands in where no map names triangles.
+            let (edge, named) = if table.named == 0 { (1, 1) } else { (resolution, table.named) };
+            if self.names_texture.width() != edge || self.names_texture.depth_or_array_layers() != named {
+                self.names_texture = maps_texture(gpu, NAMES, edge, named);
+                self.names = layers(&self.names_texture);
             }
         }
         self.table = table;
         (new_views, true)
+    }
+
+    /// Whether any map names triangles.
+    pub(crate) fn is_named(&self) -> bool {
+        self.table.named > 0
     }
 
     /// Lights that shine through everything, because there are more than maps.
@@ -111,14 +145,21 @@ impl ShadowMaps {
     ) {
         let span = timer.span("shadow maps");
         let count = self.table.views.len();
-        let layout = self.pipeline.get_bind_group_layout(0);
-        for layer in 0..count {
-            let view = self.texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: layer as u32,
-                array_layer_count: Some(1),
-                ..Default::default()
-            });
+        for (layer, shadow_view) in self.table.views.iter().enumerate() {
+            let view = one_layer(&self.texture, layer as u32);
+            let names =
+                (shadow_view.layer != NO_LAYER).then(|| one_layer(&self.names_texture, shadow_view.layer));
+            let pipeline = if names.is_some() { &self.naming } else { &self.depths };
+            let layout = pipeline.get_bind_group_layout(0);
+            let colours = [names.as_ref().map(|view| wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })];
             let offset = layer as u64 * VIEW_STRIDE;
             let group = pipelines::bind(
                 gpu,
@@ -127,34 +168,47 @@ impl ShadowMaps {
             );
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("shadow map"),
+                color_attachments: if names.is_some() { &colours } else { &[] },
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: &view,
                     depth_ops: Some(wgpu::Operations {
                         load: wgpu::LoadOp::Clear(0.0),
-                        store: wgpu::StoreOp::Store,
+                        store: if names.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
                     }),
                     stencil_ops: None,
                 }),
                 timestamp_writes: timer.render_writes(span, layer == 0, layer + 1 == count),
                 ..Default::default()
             });
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             geometry.draw(&mut pass, 0..1, |_, _| true);
         }
     }
 }
 
-fn maps_texture(gpu: &Gpu, resolution: u32, count: u32) -> wgpu::Texture {
+/// Names of triangles: their numbers plus one, 0 for none.
+const NAMES: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+fn maps_texture(gpu: &Gpu, format: wgpu::TextureFormat, resolution: u32, count: u32) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("shadow maps"),
         size: wgpu::Extent3d { width: resolution, height: resolution, depth_or_array_layers: count },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Depth32Float,
+        format,
         usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
+    })
+}
+
+fn one_layer(texture: &wgpu::Texture, layer: u32) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2),
+        base_array_layer: layer,
+        array_layer_count: Some(1),
+        ..Default::default()
     })
 }
 

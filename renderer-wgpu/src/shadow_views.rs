@@ -1,6 +1,6 @@
 //! Turns lights into the table that shaders read, and into the views from which their shadow maps are drawn.
 
-use crate::layout::{AREA_FACES, LightUniform, MAP_SEED, ShadowView};
+use crate::layout::{AREA_FACES, LightUniform, MAP_SEED, NO_LAYER, ShadowView};
 use glam::{Mat4, Vec3, Vec4};
 use photonstream_scene::SceneLight;
 use photonstream_shading::{
@@ -17,13 +17,22 @@ pub(crate) struct LightTable {
     pub(crate) views: Vec<ShadowView>,
     /// Edge of each map in texels; 0 without maps.
     pub(crate) resolution: u32,
+    /// Views whose maps name triangles, in the order of their layers: those of lights without extent.
+    pub(crate) named: u32,
     /// Lights for which there was no map left: they shine through everything.
     pub(crate) unshadowed: u32,
 }
 
 impl LightTable {
-    /// The table of `lights`; area lights have maps around up to `points` of their points.
-    pub(crate) fn new(lights: &[SceneLight], bounds: Bounds, points: u32, with_maps: bool) -> Self {
+    /// The table of `lights`; area lights have maps around up to `points` of their points, the maps of others name
+    /// triangles where `maps_are_named`.
+    pub(crate) fn new(
+        lights: &[SceneLight],
+        bounds: Bounds,
+        points: u32,
+        with_maps: bool,
+        maps_are_named: bool,
+    ) -> Self {
         let shapes = || lights.iter().map(|l| &l.light.shape);
         let wanted = |points| shapes().map(|s| maps_of(s, points)).sum::<u32>();
         // Fewer points for each area light until all lights have maps.
@@ -53,6 +62,12 @@ impl LightTable {
             if maps > 0 {
                 let sample = |k: u32| Sequence::new(MAP_SEED.into(), index as u32).sample(k.into()).next_2d();
                 views(shape, &entry, bounds, table.resolution, points, sample, &mut table.views);
+                if maps_are_named && shape.is_delta() {
+                    for view in &mut table.views[first_map as usize..] {
+                        view.layer = table.named;
+                        table.named += 1;
+                    }
+                }
             }
             table.lights.push(entry);
         }
@@ -207,7 +222,7 @@ fn view(rows: [Vec4; 4], texel: f32, parallel: bool) -> ShadowView {
         clip_from_world: matrix.to_cols_array_2d(),
         texel,
         parallel: parallel.into(),
-        pad_0: 0,
+        layer: NO_LAYER,
         pad_1: 0,
     }
 }

@@ -56,7 +56,8 @@ named! {
 named! {
     /// How lights are shadowed.
     Shadows, "shadows" {
-        /// Shadow maps with percentage-closer filtering.
+        /// Shadow maps: those of lights without extent name triangles, which each pixel's ray is tested against; those
+        /// of area lights hold depths, with percentage-closer filtering.
         #[default]
         Maps = "maps",
         /// A shadow ray for each pixel and light, several to area lights: exact.

@@ -5,11 +5,17 @@
 @group(0) @binding(3) var<storage, read> views: array<ShadowView>;
 @group(0) @binding(4) var maps: texture_depth_2d_array;
 @group(0) @binding(5) var compare: sampler_comparison;
+// Number of the triangle that a light without extent sees, plus one; 0: none.
+@group(0) @binding(6) var names: texture_2d_array<u32>;
+@group(0) @binding(7) var<storage, read> corners: array<MapCorner>;
+@group(0) @binding(8) var nearest: sampler;
 
 // What the scene has: the rest is not compiled in.
 override DELTA_LIGHTS: bool = true;
 override AREA_LIGHTS: bool = true;
 override SHADOWS: bool = true;
+// Whether the maps of lights without extent name triangles.
+override NAMED_MAPS: bool = true;
 
 @vertex
 fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
@@ -24,7 +30,7 @@ fn arrive(@builtin(position) at: vec4f) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let surface = surface_unpack(word, pixel);
-    let origin = surface_ray_origin(surface);
+    let origin = pixel_ray_origin(surface, pixel);
     var irradiance = vec3f(0.0);
     for (var i = 0u; i < frame.lights; i++) {
         if frame.only_light != ALL_LIGHTS && frame.only_light != i {
@@ -65,7 +71,12 @@ fn arriving(light: Light, surface: Surface, origin: vec3f, u: vec2f, first_map: 
             let along = cross(light.direction, across);
             map += half_cube_face(vec3f(dot(across, -reached.wi), dot(along, -reached.wi), dot(light.direction, -reached.wi)));
         }
-        lit = shadow_lit(map, surface.position, surface.normal, cos_theta);
+        if NAMED_MAPS && light.kind < LIGHT_PARALLELOGRAM {
+            let is_free = shadow_free(map, origin, reached.wi, reached.distance * SHADOW_REACH);
+            lit = select(0.0, 1.0, is_free);
+        } else if AREA_LIGHTS || !NAMED_MAPS {
+            lit = shadow_lit(map, surface.position, surface.normal, cos_theta);
+        }
     }
     return light.power * (reached.irradiance * cos_theta * lit);
 }

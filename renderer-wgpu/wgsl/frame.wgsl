@@ -68,6 +68,12 @@ fn pixel_ray(pixel: vec2u) -> vec3f {
     return camera_direction(frame.camera, vec2f(pixel) + frame.jitter, frame.size);
 }
 
+// Where a pixel's rays leave: off the surface, and as far back towards the eye, for the way there is free. A point that
+// rounding has put behind the neighbouring wall comes out from there again.
+fn pixel_ray_origin(surface: Surface, pixel: vec2u) -> vec3f {
+    return surface_ray_origin(surface) - pixel_ray(pixel) * (frame.magnitude * RELATIVE_OFFSET);
+}
+
 // Whether the visible side of the surface reflects light.
 fn object_reflects(object: Object, front: bool) -> bool {
     return (object.sides & select(2u, 1u, front)) != 0u;

@@ -40,12 +40,6 @@ fn is_in_band(id: vec2u) -> bool {
     return id.x < frame.size.x && id.y < rays.rows && rays.first_row + id.y < frame.size.y;
 }
 
-// Where a pixel's rays leave: off the surface, and as far back towards the eye, for the way there is free. A point that
-// rounding has put behind the neighbouring wall comes out from there again.
-fn pixel_ray_origin(surface: Surface, pixel: vec2u) -> vec3f {
-    return surface_ray_origin(surface) - pixel_ray(pixel) * (frame.magnitude * RELATIVE_OFFSET);
-}
-
 // Takes the stack of a suspended ray back.
 fn pixel_resume(state: PixelRays, slot: u32) {
     walk_depth = state.suspended - 1u;

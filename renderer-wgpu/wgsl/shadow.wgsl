@@ -1,10 +1,10 @@
-// Turns a point into whether a light reaches it, by the light's shadow maps.
+// Turns a point into the share of a light's point that reaches it, by the depths in its shadow map.
 
 struct ShadowView {
     clip_from_world: mat4x4f,
     texel: f32,              // edge of a texel in m: at distance 1 of a perspective view, everywhere of a parallel one
     parallel: u32,
-    pad_0: u32,
+    layer: u32,              // of the map that names triangles
     pad_1: u32,
 }
 

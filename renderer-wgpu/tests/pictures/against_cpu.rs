@@ -85,15 +85,8 @@ fn seen_alike(lit: &Lit, view: &View) -> Vec<bool> {
 }
 
 /// Pixels within `reach` of where a shadow begins: the lamp's visible share, which is the picture with shadow rays by the
-/// one without shadows, takes different values there, or lies between none and all of the lamp; or surfaces meet in a
-/// crease, at which the shadow of one on the other begins with no distance between them.
-fn near_shadow_edges(
-    shadowed: &[Vec3],
-    open: &[Vec3],
-    normals: &[Vec3],
-    width: usize,
-    reach: isize,
-) -> Vec<bool> {
+/// one without shadows, takes different values there, or lies between none and all of the lamp.
+fn near_shadow_edges(shadowed: &[Vec3], open: &[Vec3], width: usize, reach: isize) -> Vec<bool> {
     let share =
         |(s, o): (&Vec3, &Vec3)| if o.max_element() > 0.0 { s.max_element() / o.max_element() } else { 0.0 };
     let visible: Vec<f32> = shadowed.iter().zip(open).map(share).collect();
@@ -101,56 +94,71 @@ fn near_shadow_edges(
     let is_near = |i: usize| {
         let (x, y) = ((i % width) as isize, (i / width) as isize);
         let around = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (x + dx, y + dy)));
-        let around: Vec<usize> = around
+        let around = around
             .filter(|(x, y)| (0..width as isize).contains(x) && (0..height).contains(y))
-            .map(|(x, y)| y as usize * width + x as usize)
-            .collect();
-        let is_crease = around.iter().any(|&j| normals[i].distance(normals[j]) > 0.5);
-        let low = around.iter().map(|&j| visible[j]).fold(1.0, f32::min);
-        let high = around.iter().map(|&j| visible[j]).fold(0.0, f32::max);
-        is_crease || (low < 0.98 && high > 0.02)
+            .map(|(x, y)| visible[y as usize * width + x as usize]);
+        let (low, high) = around.fold((1f32, 0f32), |(low, high), v| (low.min(v), high.max(v)));
+        low < 0.98 && high > 0.02
     };
     (0..visible.len()).map(is_near).collect()
 }
 
+/// The room of the Cornell box with `lamp`, and a ball of 498 000 triangles, finer than the texels of a shadow map.
+fn fine_ball(lamp: &str, streaming: &str) -> Lit {
+    scenes::config("cornell-box.toml", |text| {
+        let room = text.split("[light.").next().unwrap().to_owned();
+        format!(
+            "{room}\n[light.lamp]\n{lamp}\n[streaming]\n{streaming}\n[object.fine]\nmaterial = \"white\"\n\
+             position_m = [0.35, 0.95, 0.3]\nsphere = {{ radius_m = 0.2, segments = 500 }}\n"
+        )
+    })
+}
+
 /// With shadow maps at most 2 % of the pixels are off the CPU's ray-traced picture by more than 5 %, and where direct light
-/// is, they lie within two pixels of a shadow's edge or of a crease. 160 × 120 pixels.
+/// is, they lie within two pixels of a shadow's edge. 160 × 120 pixels; the room of the box, and for lights without extent
+/// the same with a ball of triangles finer than a map's texels.
 ///
-/// The creases are a flaw of the maps, not of the comparison: GPU and CPU agree there by rays. Of the pixels that are off,
-/// those near creases and no visible shadow edge were 0 of 20 (point), 5 of 43 (spot), 13 of 41 (wide spot), 81 of 151 (sun)
-/// and 0 of 265 (area). The area light has 16 points of its own on both sides, of which the CPU draws others for each
-/// pixel: it is given 256, so that its noise stays below the limit.
+/// Maps of lights without extent name triangles, which are tested themselves: all but one pixel in a thousand are right.
+/// The area light has 16 points of its own on both sides, of which the CPU draws others for each pixel: it is given 256, so
+/// that its noise stays below the limit.
 #[test]
-fn shadow_maps_differ_on_shadow_edges_and_creases() {
+fn shadow_maps_differ_on_shadow_edges_only() {
     for (name, lamp) in LAMPS {
-        let lit = scenes::cornell(lamp, "vsls = 100\npool_paths = 4096");
-        let Some(mut renderer) = lit.renderer() else { return };
-        let view = View { shadows: Shadows::Maps, light_samples: 16, ..lit.view(160, 120) };
-        let exact = View { light_samples: 256, ..view };
-        let [full, direct]: [_; 2] =
-            lit.on_cpu(&exact, &[LayerKind::Full, LayerKind::Direct]).try_into().unwrap();
-        let same = seen_alike(&lit, &view);
-        let off = |found: &[Vec3], expected: &[Vec3]| -> Vec<usize> {
-            let is_off = |i: &usize| {
-                let difference = (found[*i] - expected[*i]).abs().max_element();
-                same[*i] && difference > 0.05 * full[*i].max_element().max(1e-3)
+        for (room, build) in [("box", scenes::cornell as fn(&str, &str) -> Lit), ("fine ball", fine_ball)] {
+            if name == "area" && room != "box" {
+                continue;
+            }
+            let name = format!("{name}, {room}");
+            let lit = build(lamp, "vsls = 100\npool_paths = 4096");
+            let Some(mut renderer) = lit.renderer() else { return };
+            let view = View { shadows: Shadows::Maps, light_samples: 16, ..lit.view(160, 120) };
+            let exact = View { light_samples: 256, ..view };
+            let [full, direct]: [_; 2] =
+                lit.on_cpu(&exact, &[LayerKind::Full, LayerKind::Direct]).try_into().unwrap();
+            let same = seen_alike(&lit, &view);
+            let off = |found: &[Vec3], expected: &[Vec3]| -> Vec<usize> {
+                let is_off = |i: &usize| {
+                    let difference = (found[*i] - expected[*i]).abs().max_element();
+                    same[*i] && difference > 0.05 * full[*i].max_element().max(1e-3)
+                };
+                (0..same.len()).filter(is_off).collect()
             };
-            (0..same.len()).filter(is_off).collect()
-        };
-        let found = layer(&mut renderer, &view, LayerKind::Full);
-        let share = off(&found, &full).len() as f64 / full.len() as f64;
-        assert!(share <= 0.02, "{name}: {:.2} % of the pixels", share * 100.0);
-        let mut open = |shadows| layer(&mut renderer, &View { shadows, ..exact }, LayerKind::Direct);
-        let normals = lit.on_cpu(&view, &[LayerKind::Normal]).remove(0);
-        let edges = near_shadow_edges(&open(Shadows::Rays), &open(Shadows::None), &normals, 160, 2);
-        assert!(edges.iter().filter(|&&near| near).count() * 2 < edges.len(), "{name}: edges are everywhere");
-        let found = open(Shadows::Maps);
-        let elsewhere: Vec<_> =
-            off(&found, &direct).into_iter().filter(|&i| !edges[i]).map(|i| (i % 160, i / 160)).collect();
-        assert!(elsewhere.is_empty(), "{name}: beside the edges: {elsewhere:?}");
-        // Without shadows far more are off, also beside the edges: the limits say something.
-        let bare = off(&open(Shadows::None), &direct);
-        assert!(bare.len() * 25 > full.len(), "{name} without shadows: {}", bare.len());
-        assert!(bare.iter().any(|&i| !edges[i]), "{name}: there is nothing beside the edges");
+            let found = layer(&mut renderer, &view, LayerKind::Full);
+            let share = off(&found, &full).len() as f64 / full.len() as f64;
+            let limit = if name.starts_with("area") { 0.02 } else { 0.001 };
+            assert!(share <= limit, "{name}: {:.2} % of the pixels", share * 100.0);
+            let mut open = |shadows| layer(&mut renderer, &View { shadows, ..exact }, LayerKind::Direct);
+            let edges = near_shadow_edges(&open(Shadows::Rays), &open(Shadows::None), 160, 2);
+            let near = edges.iter().filter(|&&near| near).count();
+            assert!(near * 2 < edges.len(), "{name}: edges are everywhere");
+            let found = open(Shadows::Maps);
+            let elsewhere: Vec<_> =
+                off(&found, &direct).into_iter().filter(|&i| !edges[i]).map(|i| (i % 160, i / 160)).collect();
+            assert!(elsewhere.is_empty(), "{name}: beside the edges: {elsewhere:?}");
+            // Without shadows far more are off, also beside the edges: the limits say something.
+            let bare = off(&open(Shadows::None), &direct);
+            assert!(bare.len() * 25 > full.len(), "{name} without shadows: {}", bare.len());
+            assert!(bare.iter().any(|&i| !edges[i]), "{name}: there is nothing beside the edges");
+        }
     }
 }

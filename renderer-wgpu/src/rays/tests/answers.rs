@@ -8,7 +8,11 @@ use crate::{
 
 const ANSWERS: Source = Source {
     name: "rays_answers",
-    parts: &[include_str!("../../../wgsl/rays_walk.wgsl"), include_str!("../../../wgsl/rays_answers.wgsl")],
+    parts: &[
+        include_str!("../../../wgsl/rays_triangle.wgsl"),
+        include_str!("../../../wgsl/rays_walk.wgsl"),
+        include_str!("../../../wgsl/rays_answers.wgsl"),
+    ],
 };
 
 /// Answers of the device, and the seconds that it took after a first round.
