@@ -66,14 +66,15 @@ impl Change {
     /// Whether the path of a light through `vertices` may be another one in the new version.
     #[inline]
     pub fn concerns(&self, light: usize, vertices: &[Vertex]) -> bool {
-        self.kept(light, vertices).is_some()
+        self.kept(light, vertices) != ALL
     }
 
     /// How many first points of the path of a light through `vertices` are those of its path in the new version, whatever
-    /// becomes of the others (255 where they are more); `None` where it stays as it is.
+    /// becomes of the others: at most 254, or [`ALL`].
     #[inline]
-    pub(crate) fn kept(&self, light: usize, vertices: &[Vertex]) -> Option<u8> {
-        if self.lights[light].stale { Some(0) } else { self.disturbance.first_met(vertices).map(at_most_255) }
+    pub(crate) fn kept(&self, light: usize, vertices: &[Vertex]) -> u8 {
+        let on_the_way = || self.disturbance.first_met(vertices).map_or(ALL, at_most);
+        if self.lights[light].stale { 0 } else { on_the_way() }
     }
 
     /// Looks through all paths of `pool` at once, on the present rayon pool.
@@ -107,24 +108,27 @@ impl Concerned<'_> {
     /// [`Change::concerns`] of the path of `light` in `slot`; none is concerned where there is no path.
     #[inline]
     pub fn contains(&self, light: usize, slot: u32) -> bool {
-        self.kept(light, slot).is_some()
+        self.kept(light, slot) != ALL
     }
 
     /// [`Change::kept`] of the path of `light` in `slot`.
     #[inline]
-    pub(crate) fn kept(&self, light: usize, slot: u32) -> Option<u8> {
+    pub(crate) fn kept(&self, light: usize, slot: u32) -> u8 {
         match &self.encounters {
-            Some(_) if self.change.lights[light].stale => Some(0),
-            Some(encounters) => self.pool.first_met(slot, encounters).map(at_most_255),
+            Some(_) if self.change.lights[light].stale => 0,
+            Some(encounters) => self.pool.kept(slot, encounters),
             None => self.change.kept(light, self.pool.trail(slot).unwrap_or_default()),
         }
     }
 }
 
-/// A beginning of a path may be taken for a shorter one.
+/// Stands for all points of a path, however many they are.
+pub(crate) const ALL: u8 = u8::MAX;
+
+/// A number of a path's first points, or a smaller one, in a byte: less may always be known.
 #[inline]
-pub(crate) fn at_most_255(points: usize) -> u8 {
-    points.min(255) as u8
+pub(crate) fn at_most(points: usize) -> u8 {
+    points.min(usize::from(ALL) - 1) as u8
 }
 
 fn light_revisions(old: &Simulation, new: &Simulation) -> Vec<LightRevision> {

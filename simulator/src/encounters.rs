@@ -5,6 +5,7 @@
 //! then tested as [`Disturbance::first_met`] does: the first bit of a path that is set says the same, exactly.
 
 use crate::{
+    change::{ALL, at_most},
     disturbance::{Disturbance, Obstacle},
     trail::{EMITTED, ESCAPED, Vertex},
 };
@@ -51,26 +52,26 @@ impl Encounters {
         Self { words }
     }
 
-    /// How many points of those in `path`, one path's, come before the end of its first segment that met it; `None` where
-    /// none did. Where the points are [`WORD`] or fewer they are points of one word; else they begin with a word.
+    /// How many points of those in `path`, one path's, come before the end of its first segment that met it, at most
+    /// 254; [`ALL`] where none did. Where the points are [`WORD`] or fewer they are points of one word; else they
+    /// begin with a word.
     #[inline]
-    pub(crate) fn first(&self, path: Range<usize>) -> Option<usize> {
+    pub(crate) fn kept(&self, path: Range<usize>) -> u8 {
         let (word, shift) = (path.start / WORD, path.start % WORD);
         // No segment ends at the first point.
         let segments = path.len().saturating_sub(1);
         if segments < WORD {
             let bits = (self.words[word] >> shift >> 1) & ((1 << segments) - 1);
-            return (bits != 0).then(|| bits.trailing_zeros() as usize + 1);
+            // Whether there is any is not to be predicted: no branch.
+            let none = if bits == 0 { ALL } else { 0 };
+            return (bits.trailing_zeros() as u8 + 1) | none;
         }
-        let first = self.words[word] & !1;
         let whole = path.end / WORD;
-        let rest = self.words[whole] & ((1 << (path.end % WORD)) - 1);
-        let words = std::iter::once(first).chain(self.words[word + 1..whole].iter().copied()).chain([rest]);
-        let starts = (0..).step_by(WORD);
-        words
-            .zip(starts)
-            .find(|&(bits, _)| bits != 0)
-            .map(|(bits, start)| start + bits.trailing_zeros() as usize)
+        let last = self.words[whole] & ((1 << (path.end % WORD)) - 1);
+        let between = self.words[word + 1..whole].iter().copied();
+        let words = std::iter::once(self.words[word] & !1).chain(between).chain([last]);
+        let met = words.zip((0..).step_by(WORD)).find(|&(bits, _)| bits != 0);
+        met.map_or(ALL, |(bits, start)| at_most(start + bits.trailing_zeros() as usize))
     }
 }
 
@@ -307,10 +308,10 @@ mod tests {
             pulp::Scalar.vectorize(Part { look: &look, first: 0, words: &mut plain });
             assert_eq!(plain, found.words, "case {case}");
             for path in paths {
-                let first = disturbance.first_met(&points[path.clone()]);
-                assert_eq!(found.first(path.clone()), first, "case {case}: {path:?}");
-                concerned += u32::from(first.is_some());
-                left += u32::from(first.is_none());
+                let kept = disturbance.first_met(&points[path.clone()]).map_or(ALL, at_most);
+                assert_eq!(found.kept(path.clone()), kept, "case {case}: {path:?}");
+                concerned += u32::from(kept != ALL);
+                left += u32::from(kept == ALL);
             }
         }
         assert!(concerned > 5000 && left > 5000, "{concerned} {left}");
@@ -326,13 +327,17 @@ mod tests {
                 words[i / WORD] &= !(1 << (i % WORD));
             }
             let mut encounters = Encounters { words };
-            assert_eq!(encounters.first(start..start + length), None, "{start} {length}");
+            assert_eq!(encounters.kept(start..start + length), ALL, "{start} {length}");
             for i in start + 1..start + length {
                 encounters.words[i / WORD] |= 1 << (i % WORD);
-                assert_eq!(encounters.first(start..start + length), Some(i - start), "{start} {length}: {i}");
+                assert_eq!(
+                    encounters.kept(start..start + length),
+                    (i - start) as u8,
+                    "{start} {length}: {i}"
+                );
                 encounters.words[i / WORD] &= !(1 << (i % WORD));
             }
         }
-        assert_eq!(Encounters { words: vec![u64::MAX] }.first(0..0), None, "no path has no segment");
+        assert_eq!(Encounters { words: vec![u64::MAX] }.kept(0..0), ALL, "no path has no segment");
     }
 }

@@ -169,11 +169,10 @@ impl PathPool {
         Encounters::find(disturbance, &self.vertices.storage)
     }
 
-    /// How many points of the path in `slot` come before the end of its first segment among `encounters`; `None` where
-    /// none is.
+    /// How many first points of the path in `slot` come before what it met: [`Encounters::kept`].
     #[inline]
-    pub(crate) fn first_met(&self, slot: u32, encounters: &Encounters) -> Option<usize> {
-        encounters.first(self.trails[slot as usize].range())
+    pub(crate) fn kept(&self, slot: u32, encounters: &Encounters) -> u8 {
+        encounters.kept(self.trails[slot as usize].range())
     }
 
     /// Rays that the path in `slot` took; 0 where there is no path.
@@ -234,12 +233,19 @@ impl Block {
     }
 }
 
-/// Runs of items in blocks of a power of two, at a multiple of it, each size with a list of free blocks: replacing never
-/// moves others.
+/// Sizes of blocks. Those of one page are equal; longer ones take whole pages.
+const SIZES: [u16; 22] =
+    [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 21, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384];
+
+/// Items to a page, at a multiple of which it lies: whole pools are looked through by pages.
+const PAGE: usize = 64;
+
+/// Runs of items in blocks, each size with a list of free blocks: replacing never moves others. A block of up to a page
+/// lies within one page.
 #[derive(Clone, Debug, Default)]
 struct Arena<T> {
     storage: Vec<T>,
-    free: [Vec<u32>; 15],
+    free: [Vec<u32>; SIZES.len()],
 }
 
 impl<T: Copy + Default> Arena<T> {
@@ -249,26 +255,24 @@ impl<T: Copy + Default> Arena<T> {
         }
         let class = Self::class(items.len());
         let start = self.free[class].pop().unwrap_or_else(|| self.append(class));
-        let (used, spare) =
-            self.storage[start as usize..start as usize + (1 << class)].split_at_mut(items.len());
+        let size = usize::from(SIZES[class]);
+        let (used, spare) = self.storage[start as usize..start as usize + size].split_at_mut(items.len());
         used.copy_from_slice(items);
         spare.fill(T::default());
         Block { start, length: items.len() as u16 }
     }
 
-    /// A new block of a size, at a multiple of it; what is skipped is free.
+    /// The first of new blocks of a size, as many as a page holds; the others are free.
     fn append(&mut self, class: usize) -> u32 {
         let number = |start: usize| {
             u32::try_from(start).expect("invariant: a pool's paths have fewer than 2^32 points")
         };
-        let mut end = self.storage.len();
-        while !end.is_multiple_of(1 << class) {
-            let skipped = end.trailing_zeros() as usize;
-            self.free[skipped].push(number(end));
-            end += 1 << skipped;
-        }
-        self.storage.resize(end + (1 << class), T::default());
-        number(end)
+        let (start, size) = (self.storage.len(), usize::from(SIZES[class]));
+        self.storage.resize(start + size.next_multiple_of(PAGE), T::default());
+        // The last one is taken first.
+        let others = (1..PAGE / size).rev();
+        self.free[class].extend(others.map(|i| number(start + i * size)));
+        number(start)
     }
 
     fn remove(&mut self, block: Block) {
@@ -285,9 +289,9 @@ impl<T: Copy + Default> Arena<T> {
         &mut self.storage[block.range()]
     }
 
-    /// The block size for `length` items, as a power of two.
+    /// The least size for `length` items.
     fn class(length: usize) -> usize {
-        length.next_power_of_two().trailing_zeros() as usize
+        SIZES.partition_point(|&size| usize::from(size) < length)
     }
 
     fn bytes(&self) -> usize {

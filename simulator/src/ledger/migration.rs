@@ -7,7 +7,7 @@
 
 use super::{FILLED, Ledger, STALE, UNDER_WAY};
 use crate::{
-    change::{LightRevision, at_most_255, obstacle, reach_of, reflects_alike},
+    change::{ALL, LightRevision, at_most, obstacle, reach_of, reflects_alike},
     disturbance::Disturbance,
     flux::Deposit,
     simulation::Simulation,
@@ -135,13 +135,12 @@ impl Ledger {
             {
                 let mark = self.slots[old_slot as usize];
                 let Some(path) = self.pool.whole_path(old_slot) else { continue };
-                let before = (mark & STALE != 0).then(|| self.kept[old_slot as usize]);
-                let by_light = revision.stale.then_some(0);
-                let on_the_way = migration.disturbance.first_met(path.vertices).map(at_most_255);
-                let kept = [before, by_light, on_the_way].into_iter().flatten().min();
-                let is_stale = kept.is_some();
+                let on_the_way = migration.disturbance.first_met(path.vertices).map_or(ALL, at_most);
+                let by_light = if revision.stale { 0 } else { ALL };
+                let kept = self.kept[old_slot as usize].min(on_the_way).min(by_light);
+                let is_stale = kept != ALL;
                 let alike = moved.take(migration, simulation, &path, revision.factor);
-                next.kept[slot as usize] = kept.unwrap_or(0).min(at_most_255(alike));
+                next.kept[slot as usize] = if is_stale { kept.min(at_most(alike)) } else { ALL };
                 let birth_ms = self.pool.birth_ms(old_slot).unwrap_or_default();
                 next.pool.put(&moved.path(slot), birth_ms);
                 next.slots[slot as usize] = FILLED | if is_stale { STALE } else { 0 };

@@ -1,5 +1,6 @@
 //! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
 
+mod progress;
 mod telemetry;
 
 pub use telemetry::State;
@@ -11,7 +12,7 @@ use super::{
 use crate::{
     change::Change as SceneChange,
     counters::Counters,
-    ledger::{Ledger, Migration, Task},
+    ledger::{Ledger, Task},
     records,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
@@ -311,119 +312,6 @@ impl LedgerActor {
             let _ = self.settled.send(progress.versions);
         }
         Published::Yes
-    }
-}
-
-impl Progress {
-    /// Goes on in a new version of the scene. Batches under way stay those of the old one.
-    fn edit(&mut self, version: Version) {
-        let Version { simulation, still, received_ns, time_s, only_whole } = version;
-        let follows_variance = simulation.scene.streaming.latency_ms > 0.0;
-        let simulation =
-            if follows_variance { simulation.with_split_of(&self.simulation) } else { simulation };
-        if Arc::ptr_eq(&simulation.owners, &self.simulation.owners) {
-            let is_still = Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry);
-            self.places += u64::from(!is_still);
-            let change = SceneChange::between(&self.simulation, &simulation);
-            let budget = self.budget(&simulation);
-            self.ledger.revise(&simulation, change, budget);
-        } else {
-            self.places += 1;
-            self.placements += 1;
-            let migration = Migration::between(&self.simulation, &simulation);
-            // Its place is taken at once.
-            let old = std::mem::replace(&mut self.ledger, simulation.ledger());
-            let budget = self.budget(&simulation);
-            self.ledger = old.migrate(&migration, &simulation, budget);
-        }
-        self.tracer = Arc::new(simulation.tracer.clone());
-        self.simulation = simulation;
-        self.still = still;
-        (self.time_s, self.only_whole, self.unsettled) = (time_s, only_whole, true);
-        self.versions += 1;
-        if !self.changed {
-            self.shown_at = Instant::now();
-        }
-        self.edit_received_ns = received_ns;
-        // An edit that needs no ray is traced with its arrival.
-        self.traced_ns = monotonic_ns();
-        if self.waiting_since_ns.is_none() {
-            self.waiting_since_ns = Some(received_ns);
-            self.paths_before_change = self.ledger.counters().paths;
-        }
-        // A power alone moves no path.
-        self.split_is_due |= !self.ledger.is_settled();
-        self.note_whole_light();
-        self.changed = true;
-    }
-
-    /// Where the pool follows a latency target, splits it by measured variance: once after each change that was traced,
-    /// as soon as its light is whole, so that a still scene comes to rest.
-    fn follow_variance(&mut self) {
-        let scene = &self.simulation.scene;
-        if !self.split_is_due || scene.streaming.latency_ms <= 0.0 || !self.ledger.is_settled() {
-            return;
-        }
-        self.split_is_due = false;
-        let Some(slots) = self.ledger.better_split(scene) else { return };
-        let next = self.simulation.with_split(&slots);
-        // Its place is taken at once.
-        let old = std::mem::replace(&mut self.ledger, next.ledger());
-        self.ledger = old.resplit(&self.simulation, &next);
-        self.tracer = Arc::new(next.tracer.clone());
-        self.simulation = next;
-        self.changed = true;
-    }
-
-    /// The number of paths that can be traced in the time that a change may take; `None` where it may take any.
-    fn budget(&self, simulation: &Simulation) -> Option<u32> {
-        let latency_ms = simulation.scene.streaming.latency_ms;
-        if latency_ms <= 0.0 {
-            return None;
-        }
-        let paths_per_ms = self.paths_per_ms.or_else(|| {
-            let ms = self.active_time(Instant::now()).as_secs_f64() * 1e3;
-            let paths = self.ledger.counters().paths;
-            // A rate of less than that says little.
-            (paths >= 4096 && ms > 0.0).then(|| paths as f64 / ms)
-        })?;
-        // The frame that shows it has to be made, too.
-        let time = (latency_ms - self.publishing.as_secs_f64() * 1e3).max(0.1 * latency_ms);
-        Some((paths_per_ms * time).min(f64::from(u32::MAX)) as u32)
-    }
-
-    /// Notes how long a change has taken, once its light is traced, and how many paths a change can take in a time.
-    fn note_whole_light(&mut self) {
-        if self.ledger.is_settled()
-            && let Some(since) = self.waiting_since_ns.take()
-        {
-            self.latency_ms = self.traced_ns.saturating_sub(since) as f64 * 1e-6;
-            let paths = self.ledger.counters().paths.saturating_sub(self.paths_before_change);
-            // Fewer are over before the threads have begun.
-            if paths >= 1024 && self.latency_ms > 0.0 {
-                let now = paths as f64 / self.latency_ms;
-                self.paths_per_ms = Some(self.paths_per_ms.map_or(now, |before| 0.5 * (before + now)));
-            }
-        }
-    }
-
-    fn now_ms(&self) -> u32 {
-        u32::try_from(self.started.elapsed().as_millis()).unwrap_or(u32::MAX)
-    }
-
-    fn note_activity(&mut self, now: Instant) {
-        match (self.ledger.in_flight() > 0, self.active_since) {
-            (true, None) => self.active_since = Some(now),
-            (false, Some(since)) => {
-                self.active += now - since;
-                self.active_since = None;
-            }
-            _ => {}
-        }
-    }
-
-    fn active_time(&self, now: Instant) -> Duration {
-        self.active + self.active_since.map_or(Duration::ZERO, |since| now - since)
     }
 }
 
