@@ -2,6 +2,8 @@
 
 mod scenes;
 mod start;
+#[cfg(test)]
+mod tests;
 
 use super::{
     ConfigSource,

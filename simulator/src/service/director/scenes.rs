@@ -227,7 +227,7 @@ impl Director {
     }
 
     /// Whether anything in the scene is to move or to dim yet.
-    fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(&self) -> bool {
         is_moving(&self.simulation.scene, Some(self.animated_s))
     }
 
