@@ -1,5 +1,8 @@
 //! Turns snapshots of the ledger into frames in shared memory.
 
+#[cfg(test)]
+mod tests;
+
 use crate::records;
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{

@@ -267,3 +267,71 @@ fn read_twice(path: &Path) -> io::Result<String> {
     }
     last
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use std::{
+        fs,
+        io::Write,
+        sync::atomic::{AtomicBool, Ordering},
+    };
+
+    const TEXT: &str = "[camera]\nposition_m = [0, 0, 5]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n\
+         [material.a]\nalbedo = 0.5\n[object.mesh]\nmaterial = \"a\"\nobj = { path = \"mesh.obj\" }\n";
+
+    /// A mesh is written again and again, row by row, valid after every row, in 40 passes of 12 rows: whenever it was read
+    /// and not changed since, as far as its stamp says, the scene that was made of it is that of the file.
+    #[test]
+    fn no_half_of_a_mesh_is_taken_for_all_of_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        let mesh = folder.path().join("mesh.obj");
+        let row = |i: u32| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -3 -2 -1\n");
+        fs::write(&mesh, row(0)).unwrap();
+        fs::write(&path, TEXT).unwrap();
+        let mut source = ConfigSource::new(&path, Default::default());
+        let scene = source.load().unwrap();
+        let mut watch = Watch {
+            files: scene.files.to_vec(),
+            watcher: None,
+            watched: false,
+            told: flume::bounded(1).1,
+            tried: None,
+            config_seen: Stamp::default(),
+            assets_seen: Vec::new(),
+            told_last: Told::Scene(scene.hash),
+            missing: 0,
+            source,
+        };
+        let written = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for pass in 0..40 {
+                    let mut file = fs::File::create(&mesh).unwrap();
+                    for i in 0..12 {
+                        file.write_all(row(pass + i).as_bytes()).unwrap();
+                        std::thread::sleep(Duration::from_millis(1 + u64::from(pass % 4) * 4));
+                    }
+                }
+                written.store(true, Ordering::Release);
+            });
+            let mut last = None;
+            loop {
+                let is_over = written.load(Ordering::Acquire);
+                if watch.assets() != watch.assets_seen {
+                    last = watch.load(TEXT).map(|loaded| loaded.map(|scene| scene.hash).ok());
+                }
+                if is_over && watch.assets() == watch.assets_seen {
+                    break;
+                }
+                std::thread::yield_now();
+            }
+            let whole = watch.source.load_text(TEXT).unwrap();
+            assert_eq!(whole.geometry.triangles.len(), 12);
+            assert_eq!(last, Some(Some(whole.hash)));
+        });
+    }
+}

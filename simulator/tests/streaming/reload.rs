@@ -253,3 +253,42 @@ fn files_that_a_config_names_are_watched_too() {
     assert!(red.config_generation == larger.config_generation + 1 && red.scene_hash != larger.scene_hash);
     edited.end();
 }
+
+/// While 100 000 lights are placed, which takes seconds, pauses, queries and edits are answered and shown, and what was
+/// edited is in the scene that comes: the light is that of a new simulation. An end in the middle of it does not wait.
+#[test]
+fn everything_goes_on_while_many_lights_are_placed() {
+    let mut edited = start("many");
+    let set_vsls = |edited: &Edited, vsls: u32| {
+        let mut client = edited.service.connect();
+        let values = json!({ "vsls": vsls }).as_object().unwrap().clone();
+        let waits = std::thread::spawn(move || client.request(&Request::SetStreaming { values }, PATIENCE));
+        let mut client = edited.service.connect();
+        loop {
+            let Reply::State { state } = client.request(&Request::Query, PATIENCE).unwrap() else { panic!() };
+            if state["placing"] == true {
+                return (waits, client);
+            }
+            assert!(!waits.is_finished(), "placed before it was seen");
+        }
+    };
+    let (waits, mut client) = set_vsls(&edited, 100_000);
+    assert!(matches!(client.request(&Request::Pause, PATIENCE).unwrap(), Reply::Ok { .. }));
+    let values = json!({ "power_w": 6 }).as_object().unwrap().clone();
+    let request = Request::SetLight { name: "bulb".into(), values };
+    let Reply::Ok { frame: number } = client.request(&request, PATIENCE).unwrap() else { panic!() };
+    let shown = frame_where(&mut edited.subscriber, number, |_| (), |_| true);
+    assert_eq!((shown.vsls.len(), shown.lights[0].power), (80, [6.0; 3]));
+    let Reply::State { state } = client.request(&Request::Query, PATIENCE).unwrap() else { panic!() };
+    assert_eq!((&state["placing"], &state["paused"], &state["vsls"]), (&json!(true), &json!(true), &json!(80)));
+    assert!(!waits.is_finished());
+    assert!(matches!(client.request(&Request::Resume, PATIENCE).unwrap(), Reply::Ok { .. }));
+    assert!(matches!(waits.join().unwrap().unwrap(), Reply::Ok { .. }));
+    let many = edited.wait_for(&text(0.0, 100_000, 0.8).replace("power_w = 3", "power_w = 6"));
+    assert_eq!(many.vsls.len(), 100_000);
+
+    let (waits, _client) = set_vsls(&edited, 99_999);
+    edited.end();
+    let answer = waits.join().unwrap();
+    assert!(!matches!(answer, Ok(Reply::Ok { .. })), "{answer:?}");
+}

@@ -147,6 +147,46 @@ fn a_converged_scene_uses_no_processor() {
     run.wait();
 }
 
+/// A scene that moves and never converges, paused in the middle by the control socket: less than 1 % of one processor over
+/// 5 s, that is under 5 ticks of 10 ms; then it goes on.
+#[test]
+fn a_paused_scene_uses_no_processor() {
+    let ground = Ground::new();
+    let scene = config("cornell-ball.toml");
+    let line = "--channel paused --vsls 200 --pool 65536 --sampling fresh";
+    let arguments: Vec<_> = ["simulate", &scene].into_iter().chain(line.split_whitespace()).collect();
+    let run = ground.start(&arguments);
+    let mut subscriber = attach(&ground, "paused");
+    frame_where(&mut subscriber, |frame| frame.statistics.simulation_time_s > 0.1);
+    send(&ground, "paused", json!({ "type": "pause" }));
+    let runtime = Runtime::at(ground.runtime());
+    let mut client = ControlClient::connect_in(&runtime, &"paused".parse().unwrap()).unwrap();
+    let mut paths = || match client.request(&Request::Query, PATIENCE).unwrap() {
+        Reply::State { state } => {
+            assert_eq!((&state["paused"], &state["converged"]), (&json!(true), &json!(false)));
+            state["paths"].as_u64().unwrap()
+        }
+        other => panic!("{other:?}"),
+    };
+    // What is in flight still arrives.
+    let mut before = paths();
+    wait_for("the last paths", || {
+        std::thread::sleep(Duration::from_millis(200));
+        let last = std::mem::replace(&mut before, paths());
+        (last == before).then_some(())
+    });
+    let pid = ground.process(" simulate ", None);
+    let used = usage(pid);
+    std::thread::sleep(Duration::from_secs(5));
+    let ticks = usage(pid)[0] - used[0];
+    assert!(ticks < 5, "{ticks} ticks of 10 ms in 5 s");
+    assert_eq!(paths(), before);
+    send(&ground, "paused", json!({ "type": "resume" }));
+    frame_where(&mut subscriber, |frame| frame.statistics.paths_total > before);
+    run.signal(Signal::TERM);
+    run.wait();
+}
+
 /// A moving light for 2·10⁷ deposits (10⁹ with `PHOTONSTREAM_LONG=1`), then off: exactly nothing is left; memory, files and
 /// threads are those of the first tenth.
 #[test]
