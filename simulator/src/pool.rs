@@ -186,6 +186,13 @@ impl PathPool {
         self.vertices.storage.len()
     }
 
+    /// The first `points` points of the path in `slot` and their barycentric coordinates; `None` where it has fewer.
+    pub(crate) fn beginning(&self, slot: u32, points: u8) -> Option<(&[Vertex], &[[f32; 2]])> {
+        let Block { start, length } = self.trails[slot as usize];
+        let range = start as usize..start as usize + usize::from(points);
+        (u16::from(points) <= length).then(|| (&self.vertices.storage[range.clone()], &self.uvs[range]))
+    }
+
     /// The path in `slot`; `None` where there is none.
     pub fn whole_path(&self, slot: u32) -> Option<Path<'_>> {
         let Slot { deposits, valid, .. } = *self.slots.get(slot as usize)?;

@@ -76,7 +76,9 @@ impl Ledger {
         if self.sampling == Sampling::Replay && slots.iter().any(|&slot| is_stale(slot)) {
             for &slot in slots {
                 let points = if is_stale(slot) { self.kept[slot as usize] } else { 0 };
-                self.savings.rays_saved += begun.push(self.pool.whole_path(slot), points);
+                // Where nothing is known the path is not looked up: most lookups miss the cache.
+                let known = (points >= 2).then(|| self.pool.beginning(slot, points)).flatten();
+                self.savings.rays_saved += begun.push(known);
             }
         }
         begun

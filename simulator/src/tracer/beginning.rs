@@ -5,7 +5,7 @@
 //! the light and the reflections so far, its next direction from the sample's own numbers, counted by bounces. Every
 //! operation is that of tracing the path from its light, so that the bits are the same; only the rays are saved.
 
-use super::{Path, Tracer, wave};
+use super::{Tracer, wave};
 use crate::{
     flux::Deposit,
     trail::{Event, Vertex},
@@ -38,17 +38,15 @@ impl Known<'_> {
 }
 
 impl Beginnings {
-    /// Adds the next path of the batch: the first `points` of `path` are known, where it is from a hit that it goes on.
-    /// Returns the number of rays that this saves.
-    pub(crate) fn push(&mut self, path: Option<Path<'_>>, points: u8) -> u64 {
-        let Some(path) = path.filter(|path| points >= 2 && path.vertices.len() >= usize::from(points)) else {
-            self.counts.push(0);
-            return 0;
-        };
-        self.counts.push(points);
-        self.vertices.extend(&path.vertices[..usize::from(points)]);
-        self.uvs.extend(&path.uvs[..usize::from(points)]);
-        u64::from(points) - 1
+    /// Adds the next path of the batch, of which the points and their barycentric coordinates are known, at least one hit;
+    /// `None` where nothing is. Returns the number of rays that this saves.
+    pub(crate) fn push(&mut self, known: Option<(&[Vertex], &[[f32; 2]])>) -> u64 {
+        let (vertices, uvs) = known.unwrap_or_default();
+        debug_assert!(vertices.len() == uvs.len() && vertices.len() <= usize::from(u8::MAX));
+        self.counts.push(vertices.len() as u8);
+        self.vertices.extend_from_slice(vertices);
+        self.uvs.extend_from_slice(uvs);
+        (vertices.len() as u64).saturating_sub(1)
     }
 
     pub(super) fn paths(&self) -> impl Iterator<Item = Known<'_>> {
