@@ -9,6 +9,7 @@ use std::{
 /// A virtual display; it ends with the test.
 pub(crate) struct Display {
     server: Child,
+    manager: Option<Child>,
     /// As in the variable DISPLAY.
     pub(crate) name: String,
 }
@@ -37,7 +38,32 @@ impl Display {
         let mut number = String::new();
         BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
         assert!(!number.trim().is_empty(), "Xvfb found no free display");
-        Some(Self { server, name: format!(":{}", number.trim()) })
+        Some(Self { server, manager: None, name: format!(":{}", number.trim()) })
+    }
+
+    /// Lets openbox manage the windows from now on; `false`, said loudly, where there is none.
+    pub(crate) fn is_managed(&mut self) -> bool {
+        let quiet = || Stdio::null();
+        let mut command = Command::new("openbox");
+        command.env("DISPLAY", &self.name).env_remove("WAYLAND_DISPLAY").stdout(quiet()).stderr(quiet());
+        match command.spawn() {
+            Ok(manager) => self.manager = Some(manager),
+            Err(error) => {
+                test_gpu::skip(&format!("openbox cannot be started: {error}"));
+                return false;
+            }
+        }
+        // It owns the screen once it answers questions about the desktops.
+        let asks = || {
+            Command::new("xdotool").arg("get_num_desktops").env("DISPLAY", &self.name).output().unwrap().status
+        };
+        for _ in 0..600 {
+            if asks().success() {
+                return true;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        panic!("openbox does not answer");
     }
 
     /// Runs xdotool; what it said, without the end of the line.
@@ -52,6 +78,10 @@ impl Display {
 impl Drop for Display {
     fn drop(&mut self) {
         // It may have ended already.
+        if let Some(manager) = &mut self.manager {
+            let _ = manager.kill();
+            let _ = manager.wait();
+        }
         let _ = self.server.kill();
         let _ = self.server.wait();
     }

@@ -224,6 +224,36 @@ fn a_hidden_window_draws_nothing_and_catches_up() {
     window.expect_end();
 }
 
+/// Minimised by a window manager it draws nothing while the light changes; restored, it shows the newest.
+#[test]
+fn a_minimised_window_draws_nothing_and_catches_up() {
+    let Some((mut display, mut renderer)) = ready() else { return };
+    if !display.is_managed() {
+        return;
+    }
+    let mut simulator = Simulator::start("minimised");
+    let mut window = Window::open(&display, simulator.channel(), SIZE, &["--visibility", "none"]);
+    window.rest(&mut simulator);
+    compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    for _ in 0..2 {
+        window.minimise();
+        // What was being drawn is shown still.
+        std::thread::sleep(std::time::Duration::from_secs(1));
+        let before = window.presented();
+        simulator.restart();
+        while !simulator.is_at_rest() {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        assert_eq!(window.presented(), before, "it cannot be seen");
+        window.restore();
+        window.wait("a picture once it is back", |w| w.presented() > before);
+        window.rest(&mut simulator);
+        compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
+    }
+    window.terminate();
+    window.expect_end();
+}
+
 #[test]
 fn without_a_display_the_way_out_is_told() {
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_photonstream-window"))

@@ -54,8 +54,9 @@ impl Simulator {
 
     /// Whether the light has converged in a simulation that runs.
     pub(crate) fn is_at_rest(&mut self) -> bool {
-        let is_live = self.subscriber.liveness() == Liveness::Live;
-        is_live && self.newest().statistics.converged != 0
+        // Reading finds the next run, too.
+        let is_converged = self.newest().statistics.converged != 0;
+        is_converged && self.subscriber.liveness() == Liveness::Live
     }
 
     /// Where the middle of an object is now, in the scene's space.

@@ -158,6 +158,18 @@ impl<'a> Window<'a> {
         self.display.hands(&["windowmap", "--sync", &id]);
     }
 
+    /// Asks the window manager to make an icon of it.
+    pub(crate) fn minimise(&mut self) {
+        let id = self.id();
+        self.display.hands(&["windowminimize", "--sync", &id]);
+    }
+
+    /// Asks the window manager to put it back and before all others.
+    pub(crate) fn restore(&mut self) {
+        let id = self.id();
+        self.display.hands(&["windowactivate", "--sync", &id]);
+    }
+
     /// Presses the key for a screenshot and reads the file.
     pub(crate) fn screenshot(&mut self) -> Shot {
         self.shots += 1;
