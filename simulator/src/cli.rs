@@ -1,12 +1,13 @@
 //! Turns command-line arguments into a running simulator.
 
 use crate::{
+    cancel::Cancel,
     error::SimulatorError,
     service::{self, ConfigSource, Options, Summary},
     simulation::Simulation,
 };
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{Sampling, SceneConfig};
+use photonstream_scene::{Sampling, Scene, SceneConfig};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
@@ -90,7 +91,10 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         tracing::warn!("{}: {notice}", scene.name);
     }
     let loaded = begun.elapsed();
-    let simulation = Simulation::new(Arc::new(scene));
+    let name = scene.name.clone();
+    let Some(simulation) = place(scene, &stop)? else {
+        return Ok(Summary::of_nothing(name, begun.elapsed()));
+    };
     tracing::info!(
         scene = %simulation.scene.name,
         triangles = simulation.scene.geometry.triangles.len(),
@@ -111,6 +115,27 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
     service::run(simulation, &options, &stop)
 }
 
+/// Places the lights of the first scene; `None` where it is told to stop before.
+fn place(scene: Scene, stop: &flume::Receiver<()>) -> Result<Option<Simulation>, SimulatorError> {
+    let cancel = Cancel::default();
+    let (sender, placed) = flume::bounded(1);
+    let placer = {
+        let cancel = cancel.clone();
+        service::spawn("placer", move || {
+            // Whoever stops does not wait for it.
+            let _ = sender.send(Simulation::new_unless(Arc::new(scene), &cancel));
+        })?
+    };
+    let simulation = flume::Selector::new()
+        .recv(stop, |_| Ok(None))
+        .recv(&placed, |placed| placed.map_err(|_| SimulatorError::ActorStopped { actor: "placer" }))
+        .wait();
+    cancel.cancel();
+    // What it had to say has been said.
+    let _ = placer.join();
+    simulation
+}
+
 /// A channel that gets a message with the first signal that asks for the end.
 fn stop_on_signals() -> Result<flume::Receiver<()>, SimulatorError> {
     let (sender, stop) = flume::bounded(1);
@@ -123,4 +148,25 @@ fn stop_on_signals() -> Result<flume::Receiver<()>, SimulatorError> {
         }
     })?;
     Ok(stop)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    /// Told to stop before half a million lights are placed; and not told to, for one a surface.
+    #[test]
+    fn a_stop_ends_the_first_placement() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/cornell-box.toml");
+        let scene = |vsls| {
+            let overrides = Overrides { vsls: Some(vsls), ..Overrides::default() };
+            ConfigSource::new(&path, overrides).load().unwrap()
+        };
+        let (sender, stop) = flume::bounded(1);
+        assert!(place(scene(1), &stop).unwrap().is_some());
+        sender.send(()).unwrap();
+        assert!(place(scene(500_000), &stop).unwrap().is_none());
+    }
 }

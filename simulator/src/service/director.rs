@@ -67,6 +67,14 @@ pub struct Summary {
     pub counters: Counters,
 }
 
+impl Summary {
+    /// Of a simulation that was stopped before it began.
+    pub(crate) fn of_nothing(scene: String, ran: Duration) -> Self {
+        let counters = Counters::default();
+        Self { scene, ending: Ending::Stopped, seconds: ran.as_secs_f64(), frames: 0, counters }
+    }
+}
+
 /// Runs a simulation on a channel until `stop` gets a message or is closed, or a client asks for its end.
 ///
 /// # Errors

@@ -265,8 +265,9 @@ impl LedgerActor {
                 let _ = reply.send(progress.frames + 1);
             }
             ToLedger::Edit(version, reply) => {
-                progress.edit(*version);
+                // Whoever asked does not wait while the pool is moved to other lights.
                 let _ = reply.send(progress.frames + 1);
+                progress.edit(*version);
             }
             ToLedger::Query(reply) => {
                 // Whoever asked may have gone.

@@ -95,8 +95,14 @@ fn two_renderers_follow_every_change_of_one_simulation() {
         both_go_on(&format!("pictures after step {step}"));
     }
     let is_red = |frame: &VslFrame| frame.lights[0].power == [30.0, 0.0, 0.0] && frame.notice.is_empty();
-    frame_where(&mut subscriber, is_red);
-    both_go_on("pictures of the last scene");
+    let red = frame_where(&mut subscriber, is_red).frame;
+    wait_for("pictures of the last scene", || {
+        let shows_it = |folder: &&str| {
+            let newest = ground.path(format!("{folder}/frame-{:04}.exr", files(&ground.path(folder), "png")));
+            Film::read_exr(&newest).is_ok_and(|film| film.metadata.frame.is_some_and(|frame| frame >= red))
+        };
+        folders.iter().all(shows_it).then_some(())
+    });
     run.signal(Signal::TERM);
     run.wait().expect(130, &["scene.toml:"]);
     ground.wait_for_silence();
@@ -106,6 +112,7 @@ fn two_renderers_follow_every_change_of_one_simulation() {
         let dark = (1..=count).filter(|&number| brightness(&film(number)) < 1e-3).count();
         assert_eq!(dark, 0, "{folder}: dark pictures among {count}");
         let last = film(count);
+        assert!(last.metadata.frame.unwrap() >= red, "{folder}: {:?} of {red}", last.metadata.frame);
         let pixels = &last.layer("full").unwrap().pixels;
         assert!(pixels.iter().all(|pixel| pixel.y == 0.0 && pixel.z == 0.0), "{folder}: red light alone");
     }
