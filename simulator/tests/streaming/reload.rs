@@ -280,7 +280,10 @@ fn everything_goes_on_while_many_lights_are_placed() {
     let shown = frame_where(&mut edited.subscriber, number, |_| (), |_| true);
     assert_eq!((shown.vsls.len(), shown.lights[0].power), (80, [6.0; 3]));
     let Reply::State { state } = client.request(&Request::Query, PATIENCE).unwrap() else { panic!() };
-    assert_eq!((&state["placing"], &state["paused"], &state["vsls"]), (&json!(true), &json!(true), &json!(80)));
+    assert_eq!(
+        (&state["placing"], &state["paused"], &state["vsls"]),
+        (&json!(true), &json!(true), &json!(80))
+    );
     assert!(!waits.is_finished());
     assert!(matches!(client.request(&Request::Resume, PATIENCE).unwrap(), Reply::Ok { .. }));
     assert!(matches!(waits.join().unwrap().unwrap(), Reply::Ok { .. }));
