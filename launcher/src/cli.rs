@@ -67,6 +67,8 @@ pub(crate) enum Command {
     Reference(reference::Args),
     /// Say how far a picture is from another
     Compare(compare::Args),
+    /// Write a scene for another renderer: Mitsuba 3
+    Export(export::Args),
     /// Show what a running simulation does
     Inspect(inspect::Args),
     /// Change a running simulation: lights, objects, materials, time

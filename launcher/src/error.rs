@@ -3,6 +3,7 @@
 use crate::{assignment::AssignmentError, exit};
 use photonstream_evaluation::MetricsError;
 use photonstream_film::FilmError;
+use photonstream_mitsuba::ExportError;
 use photonstream_protocol::ProtocolError;
 use photonstream_recording::RecordingError;
 use photonstream_renderer::RenderError;
@@ -38,6 +39,9 @@ pub(crate) enum LauncherError {
     /// A comparison.
     #[error(transparent)]
     Metrics(#[from] MetricsError),
+    /// A scene for another renderer.
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Usage(String),

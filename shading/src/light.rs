@@ -218,7 +218,7 @@ impl Light {
 ///
 /// Its integral over the sphere is π (`versine_inner` + `versine_outer`).
 #[inline]
-fn spot_profile(versine: f32, versine_inner: f32, versine_outer: f32) -> f32 {
+pub fn spot_profile(versine: f32, versine_inner: f32, versine_outer: f32) -> f32 {
     let width = versine_outer - versine_inner;
     if versine <= versine_inner {
         1.0

@@ -11,7 +11,7 @@ use crate::{
 use photonstream_renderer::{LayerKind, Watch, cli::Size};
 use photonstream_renderer_cpu::{
     ReferenceOptions, reference,
-    reference::{ReferenceStats, Stop},
+    reference::{PixelFilter, ReferenceStats, Stop},
 };
 use photonstream_scene::SceneConfig;
 use serde::Serialize;
@@ -20,7 +20,8 @@ use std::{path::PathBuf, time::Duration};
 /// Arguments of `photonstream reference`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Every pixel is sampled at its centre, as `render` does. The noise is measured from two independent halves of the samples.
+Every pixel is sampled at its centre, as `render` does, unless --filter says otherwise. The noise is measured from two
+independent halves of the samples.
 
 Examples:
   photonstream reference configs/cornell-box.toml --out ref.exr --spp 256
@@ -50,12 +51,33 @@ pub(crate) struct Args {
     /// Size in pixels [default: as the scene says]
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
+    /// Where in a pixel its samples lie
+    #[arg(long, value_enum, default_value_t = Filter::Centre)]
+    filter: Filter,
     /// Seed of all samples
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads [default: one per core]; the picture does not depend on it
     #[arg(long)]
     threads: Option<usize>,
+}
+
+/// `--filter`.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Filter {
+    /// At its centre, as `render` does: edges are not smoothed
+    Centre,
+    /// Anywhere in it with equal weight, as other renderers do
+    Box,
+}
+
+impl From<Filter> for PixelFilter {
+    fn from(filter: Filter) -> Self {
+        match filter {
+            Filter::Centre => Self::Centre,
+            Filter::Box => Self::Box,
+        }
+    }
 }
 
 /// Most paths per pixel for `--error`: more than a picture is ever worth.
@@ -82,6 +104,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     }
     options.layers.clone_from(&args.show);
     options.seed = args.seed;
+    options.pixel_filter = args.filter.into();
     options.threads = args.threads;
     let cancelled = Listener::flag_only()?;
     let bar = Share::start("reference");
