@@ -10,6 +10,7 @@ pub mod camera;
 pub mod kernel;
 pub mod light;
 pub mod octahedral;
+pub mod patch;
 pub mod sampling;
 pub mod sobol;
 pub mod surface;

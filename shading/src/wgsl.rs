@@ -3,7 +3,7 @@
 //! A twin has the file stem, names, parameter order and expression order of its Rust function. Constants are printed
 //! from Rust, never typed twice.
 
-use crate::{LightShape, surface, tone::ToneMap};
+use crate::{LightShape, patch, surface, tone::ToneMap};
 use core::f32::consts::{FRAC_1_PI, PI};
 use std::fmt::Write;
 
@@ -15,17 +15,20 @@ pub const CAMERA: &str = include_str!("../wgsl/camera.wgsl");
 pub const LIGHT: &str = include_str!("../wgsl/light.wgsl");
 /// Twin of [`crate::octahedral`].
 pub const OCTAHEDRAL: &str = include_str!("../wgsl/octahedral.wgsl");
+/// Twin of [`crate::patch`].
+pub const PATCH: &str = include_str!("../wgsl/patch.wgsl");
 /// Twin of [`crate::sobol`].
 pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
 /// Twin of [`crate::tone`].
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 6] = [
+pub const TWINS: [(&str, &str); 7] = [
     ("kernel", KERNEL),
     ("camera", CAMERA),
     ("light", LIGHT),
     ("octahedral", OCTAHEDRAL),
+    ("patch", PATCH),
     ("sobol", SOBOL),
     ("tone", TONE),
 ];
@@ -54,6 +57,8 @@ pub fn constants() -> String {
     float("FRAC_1_PI", FRAC_1_PI);
     float("F32_MAX", f32::MAX);
     float("RELATIVE_OFFSET", surface::RELATIVE_OFFSET);
+    float("PATCH_NEAR_AREAS", patch::NEAR_AREAS);
+    let _ = writeln!(text, "const PATCH_MAX_CORNERS: u32 = {}u;", patch::MAX_CORNERS);
     for (number, name) in LIGHT_KINDS.iter().enumerate() {
         let _ = writeln!(text, "const LIGHT_{name}: u32 = {number}u;");
     }

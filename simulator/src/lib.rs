@@ -14,6 +14,7 @@ pub mod error;
 pub mod flux;
 pub mod ledger;
 pub mod owner;
+pub mod patch;
 pub mod placement;
 pub mod pool;
 pub mod records;

@@ -9,6 +9,7 @@
 //! for a cell in one line of the cache, and the least of four at once, without a branch to mispredict.
 
 mod build;
+mod pieces;
 
 use crate::vsl::VslId;
 use glam::Vec4;

@@ -7,7 +7,6 @@
 //! come from an R*-tree: O(n log n) instead of O(n) a removal; more points are drawn than paper A's 10 % more, see [`OVERSAMPLING`];
 //! and triangles shrink less where lights are dense.
 
-mod area;
 mod draw;
 mod share;
 mod thin;
@@ -15,6 +14,7 @@ mod thin;
 use crate::{
     cancel::Cancel,
     owner::OwnerTable,
+    patch::{self, Patch},
     vsl::{Surface, Vsl},
 };
 use photonstream_scene::Scene;
@@ -32,6 +32,8 @@ pub struct Placement {
     pub vsls: Vec<Vsl>,
     /// The lights of each surface, ordered by surface.
     pub surfaces: Vec<(Surface, Range<u32>)>,
+    /// The polygon of each light; empty until [`Placement::measure_areas`].
+    pub patches: Vec<Patch>,
 }
 
 impl Placement {
@@ -82,17 +84,18 @@ impl Placement {
             vsls.extend(placed);
             surfaces.push((share.surface, first..vsls.len() as u32));
         }
-        Self { vsls, surfaces }
+        Self { vsls, surfaces, patches: Vec::new() }
     }
 
-    /// Gives each light the area of its Voronoi cell on its surface: the set of points that it owns.
+    /// Gives each light the area of its Voronoi cell on its surface, the set of points that it owns, and the polygon that
+    /// stands for it.
     ///
     /// The areas of a surface's lights sum to its area.
     pub fn measure_areas(&mut self, scene: &Scene, owners: &OwnerTable) {
-        for (vsl, area) in
-            self.vsls.iter_mut().zip(area::of_voronoi_cells(scene, self.surfaces.as_slice(), owners))
-        {
-            vsl.area = area as f32;
+        let cells = patch::of_voronoi_cells(scene, self, owners);
+        for (vsl, (area, _)) in self.vsls.iter_mut().zip(&cells) {
+            vsl.area = *area as f32;
         }
+        self.patches = cells.into_iter().map(|(_, patch)| patch).collect();
     }
 }
