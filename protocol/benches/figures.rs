@@ -54,6 +54,8 @@ fn publish(publisher: &mut Publisher, vsls: &[VslRecord], changed: &ChunkSet) {
     let frame = FrameSource {
         vsls,
         changed: Some(changed),
+        patches: &[],
+        patches_changed: None,
         objects: &[],
         lights: &[],
         statistics: &StatisticsRecord::default(),

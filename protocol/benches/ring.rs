@@ -44,6 +44,8 @@ impl Channel {
         let frame = FrameSource {
             vsls: &self.vsls,
             changed,
+            patches: &[],
+            patches_changed: None,
             objects: &[],
             lights: &[],
             statistics: &self.statistics,

@@ -56,6 +56,7 @@ static VSL: ExponentMasks = masks(ArrayKind::Vsl.fields());
 static OBJECT: ExponentMasks = masks(ArrayKind::Object.fields());
 static LIGHT: ExponentMasks = masks(ArrayKind::Light.fields());
 static STATISTICS: ExponentMasks = masks(ArrayKind::Statistics.fields());
+static PATCH: ExponentMasks = masks(ArrayKind::Patch.fields());
 static TEXT: ExponentMasks = masks(ArrayKind::SceneText.fields());
 
 impl ExponentMasks {
@@ -96,6 +97,7 @@ pub(crate) fn all_finite(kind: ArrayKind, words: &[u64]) -> bool {
         ArrayKind::Light => LIGHT.all_finite::<16>(words),
         ArrayKind::Statistics => STATISTICS.all_finite::<32>(words),
         ArrayKind::SceneText | ArrayKind::Notice => true,
+        ArrayKind::Patch => PATCH.all_finite::<13>(words),
     }
 }
 
@@ -110,6 +112,7 @@ pub(crate) fn load(kind: ArrayKind, from: &[AtomicU64], into: &mut [u64]) -> boo
         ArrayKind::Light => LIGHT.load::<16>(from, into),
         ArrayKind::Statistics => STATISTICS.load::<32>(from, into),
         ArrayKind::SceneText | ArrayKind::Notice => TEXT.load::<8>(from, into),
+        ArrayKind::Patch => PATCH.load::<13>(from, into),
     }
 }
 

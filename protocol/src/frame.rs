@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::chunks::{CHUNK_RECORDS, ChunkSet};
 use crate::error::ProtocolError;
-use crate::record::{ArrayKind, LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
+use crate::record::{ArrayKind, LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord};
 use crate::ring_read::Head;
 use crate::shape::head;
 use crate::staging::{ArrayView, Patch, Staging};
@@ -37,6 +37,8 @@ pub struct VslFrame {
     pub statistics: StatisticsRecord,
     /// The resolved scene; the same allocation for as long as the text stays the same.
     pub scene_text: Arc<str>,
+    /// Patches of the virtual surface lights: one for each, or none at all.
+    pub patches: Vec<PatchRecord>,
     /// What is wrong with the simulation, empty while nothing is; the same allocation for as long as it stays the same.
     pub notice: Arc<str>,
 }
@@ -45,6 +47,7 @@ const ARRAYS: usize = ArrayKind::ALL.len();
 const VSL: usize = 0;
 const TEXT: usize = 4;
 const NOTICE: usize = 5;
+const PATCH: usize = 6;
 /// Words of a chunk of lights.
 const CHUNK_WORDS: usize = CHUNK_RECORDS * size_of::<VslRecord>() / 8;
 
@@ -63,6 +66,7 @@ impl Buffer {
             1 => self.frame.objects.resize_with(records, ObjectRecord::default),
             2 => self.frame.lights.resize_with(records, LightRecord::default),
             TEXT | NOTICE => self.texts[a - TEXT].resize(records, [0; 8]),
+            PATCH => self.frame.patches.resize_with(records, PatchRecord::default),
             _ => {}
         }
         self.versions[a].resize(records.div_ceil(CHUNK_RECORDS), 0);
@@ -76,6 +80,7 @@ impl Buffer {
             3 => {
                 bytemuck::cast_slice(&std::slice::from_ref(&self.frame.statistics)[..self.versions[a].len()])
             }
+            PATCH => bytemuck::cast_slice(&self.frame.patches),
             _ => self.texts[a - TEXT].as_flattened(),
         }
     }
@@ -90,6 +95,7 @@ impl Buffer {
                 let records = versions.len();
                 bytemuck::cast_slice_mut(&mut std::slice::from_mut(&mut self.frame.statistics)[..records])
             }
+            PATCH => bytemuck::cast_slice_mut(&mut self.frame.patches),
             _ => self.texts[a - TEXT].as_flattened_mut(),
         };
         (words, versions)

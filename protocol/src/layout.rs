@@ -12,7 +12,7 @@ use crate::text::TEXT_RECORD;
 /// First eight bytes of every segment.
 pub const MAGIC: [u8; 8] = *b"PHOTONS1";
 /// Major version: another one cannot be read.
-pub const ABI_MAJOR: u64 = 2;
+pub const ABI_MAJOR: u64 = 3;
 /// Minor version: a greater one adds arrays that older readers skip.
 pub const ABI_MINOR: u64 = 0;
 /// Bytes of UTF-8 a notice may have, unless there is a reason for another number.
@@ -79,7 +79,7 @@ pub(crate) mod state {
 /// Capacities of a segment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SegmentSpec {
-    /// Greatest number of virtual surface lights.
+    /// Greatest number of virtual surface lights, and of their patches.
     pub vsl_capacity: u32,
     /// Greatest number of objects.
     pub object_capacity: u32,
@@ -133,7 +133,7 @@ impl Layout {
         let mut end = HEAD_WORDS * 8;
         let mut arrays = ArrayKind::ALL.map(|kind| {
             let capacity = match kind {
-                ArrayKind::Vsl => spec.vsl_capacity as usize,
+                ArrayKind::Vsl | ArrayKind::Patch => spec.vsl_capacity as usize,
                 ArrayKind::Object => spec.object_capacity as usize,
                 ArrayKind::Light => spec.light_capacity as usize,
                 ArrayKind::Statistics => 1,

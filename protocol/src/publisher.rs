@@ -9,7 +9,7 @@ use crate::error::ProtocolError;
 use crate::heartbeat::Heartbeat;
 use crate::layout::{ABI_MAJOR, Layout, SegmentSpec, state};
 use crate::process::{Identity, monotonic_ns};
-use crate::record::{LightRecord, ObjectRecord, StatisticsRecord, VslRecord};
+use crate::record::{LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord};
 use crate::ring_write::{ArraySource, Changed, FrameHead, RingWriter};
 use crate::runtime::{ChannelDir, ChannelName, Current, Runtime};
 use crate::text::{PublishedText, fitted};
@@ -23,6 +23,10 @@ pub struct FrameSource<'a> {
     /// Chunks of `vsls` that differ from the frame published last, where the caller knows; `None` makes the publisher
     /// compare. A changed chunk that is missing here stays unseen by readers.
     pub changed: Option<&'a ChunkSet>,
+    /// Patches of `vsls`: one for each, or none at all.
+    pub patches: &'a [PatchRecord],
+    /// Chunks of `patches` that differ from the frame published last, as `changed` says it of `vsls`.
+    pub patches_changed: Option<&'a ChunkSet>,
     /// Objects.
     pub objects: &'a [ObjectRecord],
     /// Lights.
@@ -173,6 +177,11 @@ impl Publisher {
             array(bytemuck::cast_slice(&statistics), false, Changed::Compare),
             array(self.text.words(), false, Changed::Compare),
             array(self.notice.words(), false, Changed::Compare),
+            array(
+                bytemuck::cast_slice(frame.patches),
+                false,
+                frame.patches_changed.map_or(Changed::Compare, Changed::Chunks),
+            ),
         ];
         let head = FrameHead {
             publish_time_ns: now,

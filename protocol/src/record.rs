@@ -101,6 +101,21 @@ record! {
     }
 }
 
+/// Most corners of a patch.
+pub const PATCH_CORNERS: usize = 8;
+
+record! {
+    /// The polygon of a virtual surface light: where on its surface the light leaves from.
+    PatchRecord, 104 {
+        /// From the light's position to each corner, x, y, z in metres, counter-clockwise as the lit side sees them.
+        corners: [f32; 3 * PATCH_CORNERS],
+        /// Number of corners in use: 3 to 8, or 0 where the light has no polygon; those beyond are zero.
+        count: u32,
+        /// Area of the polygon in m².
+        area: f32,
+    }
+}
+
 record! {
     /// What an object is now: its place and size in the world, and what it reflects.
     ObjectRecord, 128 {
@@ -112,7 +127,7 @@ record! {
         /// and the origin, column by column. The axes are orthogonal, as long as the object has grown since it was loaded,
         /// and left-handed where it has been mirrored.
         world_from_object: [f64; 12],
-        /// Bits, none assigned in ABI 2: zero.
+        /// Bits, none assigned in ABI 3: zero.
         flags: u32,
         /// Reflectance, linear RGB in [0, 1]; that of all objects of a material.
         albedo: [f32; 3],
@@ -215,7 +230,7 @@ record! {
     }
 }
 
-/// What the six arrays of a slot hold; the number is the array's kind in the header.
+/// What the seven arrays of a slot hold; the number is the array's kind in the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum ArrayKind {
@@ -231,12 +246,14 @@ pub enum ArrayKind {
     SceneText = 5,
     /// UTF-8 text of what is wrong with the simulation, 64 bytes a record, zero-filled; empty while nothing is.
     Notice = 6,
+    /// `PatchRecord`s: one for each virtual surface light, or none at all.
+    Patch = 7,
 }
 
 impl ArrayKind {
     /// All arrays, in the order in which they lie in a slot.
-    pub const ALL: [Self; 6] =
-        [Self::Vsl, Self::Object, Self::Light, Self::Statistics, Self::SceneText, Self::Notice];
+    pub const ALL: [Self; 7] =
+        [Self::Vsl, Self::Object, Self::Light, Self::Statistics, Self::SceneText, Self::Notice, Self::Patch];
 
     /// Name in messages and in the documentation.
     pub const fn name(self) -> &'static str {
@@ -247,6 +264,7 @@ impl ArrayKind {
             Self::Statistics => "statistics",
             Self::SceneText => "scene_text",
             Self::Notice => "notice",
+            Self::Patch => "patch",
         }
     }
 
@@ -258,6 +276,7 @@ impl ArrayKind {
             Self::Light => size_of::<LightRecord>(),
             Self::Statistics => size_of::<StatisticsRecord>(),
             Self::SceneText | Self::Notice => TEXT_RECORD,
+            Self::Patch => size_of::<PatchRecord>(),
         }
     }
 
@@ -269,6 +288,7 @@ impl ArrayKind {
             Self::Light => LightRecord::FIELDS,
             Self::Statistics => StatisticsRecord::FIELDS,
             Self::SceneText | Self::Notice => &[],
+            Self::Patch => PatchRecord::FIELDS,
         }
     }
 }
@@ -333,7 +353,7 @@ mod tests {
 
     /// A changed value here is a changed ABI: renderers of another release refuse it.
     #[test]
-    fn layout_hash_is_the_one_of_abi_2() {
-        assert_eq!(LAYOUT_HASH, 0x556b_54c8_9420_1d54, "{LAYOUT_HASH:#018x}");
+    fn layout_hash_is_the_one_of_abi_3() {
+        assert_eq!(LAYOUT_HASH, 0x426a_26a9_4e8a_c067, "{LAYOUT_HASH:#018x}");
     }
 }

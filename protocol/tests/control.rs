@@ -101,7 +101,7 @@ fn rude_clients_get_typed_errors() {
     let path = simulator.root.path().join("default/control.sock");
     let connect = || UnixStream::connect(&path).unwrap();
     let mut stream = connect();
-    for byte in message(r#"{"type":"hello","abi":2}"#) {
+    for byte in message(r#"{"type":"hello","abi":3}"#) {
         stream.write_all(&[byte]).unwrap();
     }
     assert_eq!(reply(&mut stream), Reply::Ok { frame: simulator.publisher.frame() });
@@ -115,7 +115,7 @@ fn rude_clients_get_typed_errors() {
     stream.write_all(&message(r#"{"type":"pause"}"#)).unwrap();
     assert!(matches!(reply(&mut stream), Reply::Error { code, .. } if code == "no-hello"));
     let mut stream = connect();
-    stream.write_all(&message(r#"{"type":"hello","abi":3}"#)).unwrap();
+    stream.write_all(&message(r#"{"type":"hello","abi":9}"#)).unwrap();
     assert!(matches!(reply(&mut stream), Reply::Error { code, .. } if code == "abi-mismatch"));
     assert_eq!(stream.read(&mut [0]).unwrap(), 0);
     let mut stream = connect();
@@ -124,7 +124,7 @@ fn rude_clients_get_typed_errors() {
     assert_eq!(stream.read(&mut [0]).unwrap(), 0);
     // A client that hangs up without waiting is still heard.
     let mut stream = connect();
-    stream.write_all(&message(r#"{"type":"hello","abi":2}"#)).unwrap();
+    stream.write_all(&message(r#"{"type":"hello","abi":3}"#)).unwrap();
     stream.write_all(&message(r#"{"type":"resume"}"#)).unwrap();
     drop(stream);
     assert_eq!(simulator.server.requests().recv_timeout(LIMIT).unwrap().request, Request::Resume);

@@ -33,13 +33,14 @@ impl FrameWords {
             frame.notice.len() as u64,
         ];
         let statistics = std::slice::from_ref(&frame.statistics);
-        let [vsls, objects, lights, counters, text, notice] = &mut self.arrays;
+        let [vsls, objects, lights, counters, text, notice, patches] = &mut self.arrays;
         copy(vsls, &frame.vsls);
         copy(objects, &frame.objects);
         copy(lights, &frame.lights);
         copy(counters, statistics);
         copy_text(text, &frame.scene_text);
         copy_text(notice, &frame.notice);
+        copy(patches, &frame.patches);
     }
 
     /// Appends what differs from `previous` to `out`: the head, and of each array its number of records, its changed
@@ -103,10 +104,11 @@ impl FrameWords {
     /// Makes `frame` what these words say; texts that stay the same stay the same allocation.
     pub(crate) fn write_to(&self, frame: &mut VslFrame) -> Result<(), String> {
         let [epoch, number, publish_time_ns, simulation_time, config_generation, scene_hash, ..] = self.head;
-        let [vsls, objects, lights, counters, text, notice] = &self.arrays;
+        let [vsls, objects, lights, counters, text, notice, patches] = &self.arrays;
         frame.vsls = records(vsls);
         frame.chunk_frames.clear();
         frame.chunk_frames.extend(frame.vsls.iter().step_by(CHUNK_RECORDS).map(|vsl| vsl.changed_frame));
+        frame.patches = records(patches);
         frame.objects = records(objects);
         frame.lights = records(lights);
         frame.statistics = records(counters).first().copied().ok_or("no statistics")?;

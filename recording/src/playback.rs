@@ -65,6 +65,8 @@ impl Playback {
         self.publisher.publish(&FrameSource {
             vsls: &frame.vsls,
             changed: None,
+            patches: &frame.patches,
+            patches_changed: None,
             objects: &frame.objects,
             lights: &frame.lights,
             statistics: &StatisticsRecord { edit_received_ns, traced_ns, ..*s },
@@ -85,7 +87,7 @@ impl Playback {
 fn spec(frame: &VslFrame) -> SegmentSpec {
     let capacity = |count: usize| u32::try_from(count.max(1)).unwrap_or(u32::MAX);
     SegmentSpec {
-        vsl_capacity: capacity(frame.vsls.len()),
+        vsl_capacity: capacity(frame.vsls.len().max(frame.patches.len())),
         object_capacity: capacity(frame.objects.len()),
         light_capacity: capacity(frame.lights.len()),
         scene_text_capacity: capacity(frame.scene_text.len()),

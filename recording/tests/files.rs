@@ -250,6 +250,6 @@ fn what_stays_costs_nothing() {
         frame.frame = number;
         recorder.write(&frame).unwrap();
     }
-    // Head, six arrays without changes but the statistics' chunk, headers: under 600 bytes before compression.
+    // Head, seven arrays without changes but the statistics' chunk, headers: under 600 bytes before compression.
     assert!(recorder.bytes() - whole < (WHOLE_EVERY - 1) * 600, "{} and {whole}", recorder.bytes());
 }

@@ -96,7 +96,8 @@ mod tests {
     use glam::DVec3;
 
     fn factor(corners: &[Vec3], n: Vec3) -> f32 {
-        form_factor(corners, n, &mut Vec3::ZERO)
+        let mut middle = Vec3::ZERO;
+        form_factor(corners, n, &mut middle)
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Turns the simulator's state into the records that renderers read.
 
-use crate::{counters::Counters, flux::FluxReading, placement::Placement};
-use photonstream_protocol::{LightRecord, ObjectRecord, VslRecord};
+use crate::{counters::Counters, flux::FluxReading, patch::Patch, placement::Placement, vsl::Vsl};
+use glam::Vec3;
+use photonstream_protocol::{LightRecord, ObjectRecord, PatchRecord, VslRecord};
 use photonstream_scene::{ObjectId, Scene};
 use photonstream_shading::LightShape;
 
@@ -21,6 +22,44 @@ pub fn write_places(records: &mut [VslRecord], scene: &Scene, placement: &Placem
     for (record, vsl) in records.iter_mut().zip(&placement.vsls) {
         record.position = vsl.position_ws(&scene.geometry).to_array();
         record.normal = vsl.normal_ws(&scene.geometry).to_array();
+    }
+}
+
+/// The polygon of each virtual surface light, as it lies in this version of the scene.
+pub fn patch_records(scene: &Scene, placement: &Placement) -> Vec<PatchRecord> {
+    let mut records = vec![PatchRecord::default(); placement.patches.len()];
+    write_patches(&mut records, scene, placement, |_| true);
+    records
+}
+
+/// Writes the polygons of those virtual surface lights that `moved`, as they lie in this version of the scene.
+pub fn write_patches(
+    records: &mut [PatchRecord],
+    scene: &Scene,
+    placement: &Placement,
+    moved: impl Fn(&Vsl) -> bool,
+) {
+    let record = |(patch, vsl): (&Patch, &Vsl)| {
+        let mut record = PatchRecord::default();
+        let mut area = Vec3::ZERO;
+        let mut last = None;
+        for (place, corner) in record.corners.chunks_exact_mut(3).zip(patch.corners_ws(&scene.geometry, vsl))
+        {
+            place.copy_from_slice(&corner.to_array());
+            area += last.map_or(Vec3::ZERO, |last: Vec3| last.cross(corner));
+            last = Some(corner);
+            record.count += 1;
+        }
+        let first = Vec3::from_slice(&record.corners);
+        area += last.map_or(Vec3::ZERO, |last| last.cross(first));
+        record.area = 0.5 * area.length();
+        // A mirrored or crushed object may leave nothing of a polygon.
+        let is_usable = record.area > 0.0 && record.corners.iter().all(|x| x.is_finite());
+        if is_usable { record } else { PatchRecord::default() }
+    };
+    let lights = placement.patches.iter().zip(&placement.vsls);
+    for (place, light) in records.iter_mut().zip(lights).filter(|(_, (_, vsl))| moved(vsl)) {
+        *place = record(light);
     }
 }
 

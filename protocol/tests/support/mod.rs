@@ -7,7 +7,8 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use photonstream_protocol::{
-    ChunkSet, FrameSource, LightRecord, ObjectRecord, SegmentSpec, StatisticsRecord, VslFrame, VslRecord,
+    ChunkSet, FrameSource, LightRecord, ObjectRecord, PatchRecord, SegmentSpec, StatisticsRecord, VslFrame,
+    VslRecord,
 };
 
 /// Capacities for `vsls` lights.
@@ -33,6 +34,8 @@ pub fn version(chunk: usize, frame: u64) -> u64 {
 #[derive(Default)]
 pub struct Content {
     pub vsls: Vec<VslRecord>,
+    /// Those of `vsls`, which change with them.
+    pub patches: Vec<PatchRecord>,
     pub objects: Vec<ObjectRecord>,
     pub lights: Vec<LightRecord>,
     pub statistics: StatisticsRecord,
@@ -58,6 +61,11 @@ fn vsl(i: usize, version: u64) -> VslRecord {
     }
 }
 
+fn patch(i: usize, version: u64) -> PatchRecord {
+    let (x, v) = (i as f32, (version % 100_000) as f32);
+    PatchRecord { corners: std::array::from_fn(|k| x + v * k as f32), count: version as u32, area: v }
+}
+
 impl Content {
     /// The content of `frame` with `count` lights.
     pub fn new(count: usize, frame: u64) -> Self {
@@ -70,12 +78,14 @@ impl Content {
     pub fn advance(&mut self, count: usize, frame: u64) {
         self.changed = ChunkSet::for_records(count);
         self.vsls.resize(count, VslRecord::default());
+        self.patches.resize(count, PatchRecord::default());
         for (c, chunk) in self.vsls.chunks_mut(64).enumerate() {
             let version = version(c, frame);
             if version == frame || self.frame + 1 != frame {
                 self.changed.insert(c);
                 for (i, record) in chunk.iter_mut().enumerate() {
                     *record = vsl(c * 64 + i, version);
+                    self.patches[c * 64 + i] = patch(c * 64 + i, version);
                 }
             }
         }
@@ -100,6 +110,8 @@ impl Content {
         FrameSource {
             vsls: &self.vsls,
             changed: named.then_some(&self.changed),
+            patches: &self.patches,
+            patches_changed: named.then_some(&self.changed),
             objects: &self.objects,
             lights: &self.lights,
             statistics: &self.statistics,
@@ -116,6 +128,10 @@ pub fn check(frame: &VslFrame) {
     let f = frame.frame;
     for (i, record) in frame.vsls.iter().enumerate() {
         assert_eq!(*record, vsl(i, version(i / 64, f)), "light {i} of frame {f}");
+    }
+    assert!(frame.patches.len() == frame.vsls.len(), "patches of frame {f}");
+    for (i, record) in frame.patches.iter().enumerate() {
+        assert_eq!(*record, patch(i, version(i / 64, f)), "patch {i} of frame {f}");
     }
     let expected = Content::new(0, f);
     assert_eq!(frame.objects, expected.objects, "objects of frame {f}");
@@ -193,6 +209,8 @@ impl Content {
         FrameSource {
             vsls: &[],
             changed: None,
+            patches: &[],
+            patches_changed: None,
             objects: &[],
             lights: &[],
             statistics,

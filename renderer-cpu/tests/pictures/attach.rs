@@ -88,6 +88,8 @@ impl Simulator {
         let frame = FrameSource {
             vsls: &vsls,
             changed: None,
+            patches: &[],
+            patches_changed: None,
             objects: &objects,
             lights: &lights,
             statistics: &statistics,

@@ -86,6 +86,8 @@ pub(super) fn publish(publisher: &mut Publisher, vsls: &[VslRecord]) -> u64 {
     let source = FrameSource {
         vsls,
         changed: Some(&changed),
+        patches: &[],
+        patches_changed: None,
         objects: &[],
         lights: &[],
         statistics: &StatisticsRecord::default(),

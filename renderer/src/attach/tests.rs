@@ -43,6 +43,8 @@ fn publish(publisher: &mut Publisher, scene: &Scene) {
     let source = FrameSource {
         vsls: &[],
         changed: None,
+        patches: &[],
+        patches_changed: None,
         objects: &frame.objects,
         lights: &frame.lights,
         statistics: &frame.statistics,

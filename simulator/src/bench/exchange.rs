@@ -55,6 +55,8 @@ impl Exchange {
             publisher.publish(&FrameSource {
                 vsls: &vsls,
                 changed: None,
+                patches: &[],
+                patches_changed: None,
                 objects: &objects,
                 lights: &lights,
                 statistics: &StatisticsRecord::default(),

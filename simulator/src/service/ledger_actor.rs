@@ -93,6 +93,8 @@ struct Progress {
     /// Counts the versions in which objects moved, and those with other virtual surface lights.
     places: u64,
     placements: u64,
+    /// Their patches, once they were published.
+    patches: Option<progress::Placed>,
     /// Time of the simulated scene.
     time_s: f64,
     only_whole: bool,
@@ -142,6 +144,7 @@ impl LedgerActor {
             tracer: Arc::new(self.simulation.tracer.clone()),
             places: 0,
             placements: 0,
+            patches: None,
             time_s: 0.0,
             only_whole: self.only_whole,
             versions: 0,
@@ -294,9 +297,10 @@ impl LedgerActor {
         }
         records::write_flux(&mut vsls.records, progress.ledger.readings(scene), progress.now_ms());
         let still = Arc::clone(&progress.still);
+        let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
         let statistics = self.statistics(progress, converged || progress.ledger.is_converged());
-        let snapshot = Snapshot { vsls, still, statistics, paused: progress.paused };
+        let snapshot = Snapshot { vsls, patches, still, statistics, paused: progress.paused };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }

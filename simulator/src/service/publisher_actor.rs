@@ -6,8 +6,8 @@ mod tests;
 use crate::records;
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
-    FrameSource, LightRecord, NOTICE_CAPACITY, ObjectRecord, ProtocolError, Publisher, SegmentSpec,
-    StatisticsRecord, VslRecord,
+    ChunkSet, FrameSource, LightRecord, NOTICE_CAPACITY, ObjectRecord, PatchRecord, ProtocolError, Publisher,
+    SegmentSpec, StatisticsRecord, VslRecord,
 };
 use photonstream_scene::Scene;
 use std::{
@@ -21,6 +21,8 @@ use std::{
 /// What the ledger wants published.
 pub(super) struct Snapshot {
     pub(super) vsls: PlacedRecords,
+    /// The same allocation for as long as no patch changes.
+    pub(super) patches: Arc<[PatchRecord]>,
     pub(super) still: Arc<Still>,
     pub(super) statistics: StatisticsRecord,
     pub(super) paused: bool,
@@ -114,6 +116,8 @@ pub(super) struct PublisherActor {
     pub(super) orderly: Arc<AtomicBool>,
     /// The segment that could not be made.
     pub(super) refused: Option<Refused>,
+    /// The patches published last.
+    pub(super) patches: Option<Arc<[PatchRecord]>>,
 }
 
 /// A segment that could not be made.
@@ -204,9 +208,16 @@ impl PublisherActor {
     }
 
     fn publish(&mut self, snapshot: &Snapshot, notice: &str) -> Result<(), ProtocolError> {
+        let is_same = self.patches.as_ref().is_some_and(|last| Arc::ptr_eq(last, &snapshot.patches));
+        let count = snapshot.patches.len();
+        let patches_changed = if is_same { ChunkSet::for_records(count) } else { ChunkSet::all(count) };
+        // What fails to be published is not what was published last.
+        self.patches = None;
         let frame = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls.records,
             changed: None,
+            patches: &snapshot.patches,
+            patches_changed: Some(&patches_changed),
             objects: &snapshot.still.objects,
             lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
@@ -215,6 +226,7 @@ impl PublisherActor {
             config_generation: snapshot.still.config_generation,
             simulation_time_s: snapshot.statistics.simulation_time_s,
         })?;
+        self.patches = Some(Arc::clone(&snapshot.patches));
         self.latest_frame.store(frame, Ordering::Release);
         Ok(())
     }

@@ -27,6 +27,8 @@ fn publish(publisher: &mut Publisher, scene: &Scene) {
     let source = FrameSource {
         vsls: &[],
         changed: None,
+        patches: &[],
+        patches_changed: None,
         objects: &object_records(scene),
         lights: &light_records(scene),
         statistics: &StatisticsRecord::default(),

@@ -55,7 +55,12 @@ impl Display {
         }
         // It owns the screen once it answers questions about the desktops.
         let asks = || {
-            Command::new("xdotool").arg("get_num_desktops").env("DISPLAY", &self.name).output().unwrap().status
+            Command::new("xdotool")
+                .arg("get_num_desktops")
+                .env("DISPLAY", &self.name)
+                .output()
+                .unwrap()
+                .status
         };
         for _ in 0..600 {
             if asks().success() {

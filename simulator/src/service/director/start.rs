@@ -69,6 +69,7 @@ impl Director {
             latest_frame: Arc::clone(&latest_frame),
             orderly: Arc::clone(&orderly),
             refused: None,
+            patches: None,
         };
         let publisher = {
             let farewell = Farewell(farewells.clone());

@@ -1,12 +1,21 @@
 //! Turns new versions of the scene into what the ledger goes on with, and the time that changes take into budgets.
 
 use super::{Progress, SceneChange, Version};
-use crate::{ledger::Migration, simulation::Simulation};
-use photonstream_protocol::monotonic_ns;
+use crate::{ledger::Migration, records, simulation::Simulation};
+use photonstream_protocol::{PatchRecord, monotonic_ns};
+use photonstream_scene::Geometry;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
+
+/// The patches of virtual surface lights, and the versions of the scene that they are from.
+pub(super) struct Placed {
+    records: Arc<[PatchRecord]>,
+    geometry: Arc<Geometry>,
+    places: u64,
+    placements: u64,
+}
 
 impl Progress {
     /// Goes on in a new version of the scene. Batches under way stay those of the old one.
@@ -49,6 +58,35 @@ impl Progress {
         self.split_is_due |= !self.ledger.is_settled();
         self.note_whole_light();
         self.changed = true;
+    }
+
+    /// The patches of the virtual surface lights: the same allocation until one of them changes.
+    pub(super) fn patches(&mut self) -> Arc<[PatchRecord]> {
+        let (scene, placement) = (&self.simulation.scene, &self.simulation.placement);
+        let last = self.patches.take();
+        let records = match &last {
+            Some(last) if last.places == self.places => Arc::clone(&last.records),
+            Some(last) if last.placements == self.placements => {
+                let moved = |t| last.geometry.triangle(t) != scene.geometry.triangle(t);
+                let is_moved = placement.vsls.iter().any(|vsl| moved(vsl.triangle));
+                if is_moved {
+                    let mut records = last.records.to_vec();
+                    records::write_patches(&mut records, scene, placement, |vsl| moved(vsl.triangle));
+                    records.into()
+                } else {
+                    Arc::clone(&last.records)
+                }
+            }
+            _ => records::patch_records(scene, placement).into(),
+        };
+        let placed = Placed {
+            records: Arc::clone(&records),
+            geometry: Arc::clone(&scene.geometry),
+            places: self.places,
+            placements: self.placements,
+        };
+        self.patches = Some(placed);
+        records
     }
 
     /// Where the pool follows a latency target, splits it by measured variance: once after each change that was traced,

@@ -19,6 +19,7 @@ fn scene(size: f64) -> Scene {
 fn snapshot(scene: &Scene, vsls: usize) -> Snapshot {
     Snapshot {
         vsls: PlacedRecords { records: vec![VslRecord::default(); vsls], version: 0, placement: 0 },
+        patches: Arc::default(),
         still: Arc::new(Still::new(scene)),
         statistics: StatisticsRecord::default(),
         paused: false,
@@ -56,6 +57,7 @@ fn the_last_scene_goes_on_where_there_is_no_room() {
         latest_frame: Arc::new(AtomicU64::new(0)),
         orderly: Arc::new(AtomicBool::new(true)),
         refused: None,
+        patches: None,
     };
     let thread = std::thread::spawn(move || actor.run());
     let mut subscriber =
