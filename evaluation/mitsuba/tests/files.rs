@@ -10,71 +10,8 @@ use roxmltree::{Document, Node};
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
-/// Every light shape, every value of `sides`, a name that XML would mind, a sphere that moves, far from the origin.
-const SCENE: &str = r#"
-name = "All <lights> & -- sides"
-origin_m = [100, 0, 0]
-
-[camera]
-position_m = [100, 1, 4]
-target_m = [100, 0.5, 0]
-vertical_fov_deg = 40
-
-[material.grey]
-albedo = [0.5, 0.25, 0.125]
-
-[object.floor]
-material = "grey"
-position_m = [100, 0, 0]
-quad = { corner_m = [-1, 0, 1], edge_u_m = [2, 0, 0], edge_v_m = [0, 0, -2] }
-
-[object."ball & <chain>"]
-material = "grey"
-sides = "back"
-position_m = [100, 1, 0]
-sphere = { radius_m = 0.25, segments = 8 }
-
-[object.paper]
-material = "grey"
-sides = "both"
-position_m = [101, 1, 0]
-scale = [-1, 1, 1]
-quad = { corner_m = [0, 0, 0], edge_u_m = [0.1, 0, 0], edge_v_m = [0, 0.1, 0] }
-
-[light.bulb]
-power_w = [40, 20, 10]
-point = { position_m = [100.5, 1, 0.25] }
-
-[light.off]
-power_w = 0
-point = { position_m = [100, 1, 0] }
-
-[light.sun]
-irradiance_w_m2 = [3, 2, 1]
-directional = { direction = [0, -2, 0] }
-
-[light.soft]
-power_w = [9, 6, 3]
-spot = { position_m = [100, 2, 0], direction = [0, -1, 0], inner_half_angle_deg = 20, outer_half_angle_deg = 50 }
-
-[light.hard]
-power_w = 7
-spot = { position_m = [100, 2, 0], direction = [1, -1, 0], inner_half_angle_deg = 30, outer_half_angle_deg = 30 }
-
-[light.panel]
-power_w = [12, 6, 3]
-rectangle = { corner_m = [99.5, 2, -0.5], edge_u_m = [1, 0, 0], edge_v_m = [0, 0, 0.5], albedo = 0.5 }
-
-[render]
-width_px = 64
-height_px = 32
-
-[[animation]]
-object = "ball & <chain>"
-property = "position_m"
-times_s = [0, 2]
-values = [[100, 1, 0], [100, 1, -1]]
-"#;
+/// Every light shape, every value of `sides`, names that XML would mind, a ball that moves.
+const SCENE: &str = include_str!("../all-lights.toml");
 
 fn scene_at(time_s: f64) -> Scene {
     let config = SceneConfig::from_text(SCENE, Path::new("all.toml")).unwrap();
@@ -173,8 +110,8 @@ fn sides_reflect_as_the_scene_says() {
     let document = Document::parse(&text).unwrap();
     for (name, kind, colours) in [
         ("floor", "diffuse", vec!["0.5, 0.25, 0.125"]),
-        ("ball & <chain>", "twosided", vec!["0, 0, 0", "0.5, 0.25, 0.125"]),
-        ("paper", "twosided", vec!["0.5, 0.25, 0.125"]),
+        ("ball & <chain>", "twosided", vec!["0, 0, 0", "0.8, 0.8, 0.8"]),
+        ("paper", "twosided", vec!["0.8, 0.8, 0.8"]),
         ("panel", "diffuse", vec!["0.5, 0.5, 0.5"]),
     ] {
         let index = scene.object(name).unwrap().0 as usize;
@@ -282,16 +219,16 @@ fn the_camera_is_the_scenes() {
     assert_eq!(look.attribute("origin"), Some("0, 1, 4"));
     let along: Vec<_> =
         numbers(look.attribute("target").unwrap()).iter().zip([0.0, 1.0, 4.0]).map(|(t, o)| t - o).collect();
-    let length = (0.25f64 + 16.0).sqrt();
+    let length = (0.0625f64 + 16.0).sqrt();
     // The target is rounded to f32 at 4 m.
-    assert!((along[1] + 0.5 / length).abs() < 1e-6 && (along[2] + 4.0 / length).abs() < 1e-6, "{along:?}");
+    assert!((along[1] + 0.25 / length).abs() < 1e-6 && (along[2] + 4.0 / length).abs() < 1e-6, "{along:?}");
     assert_eq!(document.descendants().filter(|n| n.attribute("type") == Some("box")).count(), 1);
     let default = |document: &Document<'_>, name: &str| {
         let mut nodes = document.descendants().filter(|n| n.has_tag_name("default"));
         let node = nodes.find(|n| n.attribute("name") == Some(name)).unwrap();
         node.attribute("value").unwrap().to_owned()
     };
-    assert_eq!([default(&document, "width"), default(&document, "height")], ["64", "32"]);
+    assert_eq!([default(&document, "width"), default(&document, "height")], ["64", "56"]);
     for (file, depth) in [("direct.xml", DIRECT_MAX_DEPTH), ("full.xml", -1)] {
         let text = fs::read_to_string(folder.path().join(file)).unwrap();
         let document = Document::parse(&text).unwrap();
