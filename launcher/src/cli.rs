@@ -67,6 +67,8 @@ pub(crate) enum Command {
     Reference(reference::Args),
     /// Say how far a picture is from another
     Compare(compare::Args),
+    /// Measure speed against error of scenes, and make a page of it
+    Evaluate(evaluate::Args),
     /// Write a scene for another renderer: Mitsuba 3
     Export(export::Args),
     /// Show what a running simulation does

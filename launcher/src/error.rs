@@ -1,7 +1,7 @@
 //! Turns everything that can end a command early into one message and one exit code.
 
 use crate::{assignment::AssignmentError, exit};
-use photonstream_evaluation::MetricsError;
+use photonstream_evaluation::{EvaluateError, MetricsError};
 use photonstream_film::FilmError;
 use photonstream_mitsuba::ExportError;
 use photonstream_protocol::ProtocolError;
@@ -42,6 +42,9 @@ pub(crate) enum LauncherError {
     /// A scene for another renderer.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// An evaluation.
+    #[error(transparent)]
+    Evaluate(EvaluateError),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Usage(String),
@@ -118,6 +121,17 @@ impl From<RenderError> for LauncherError {
         match error {
             RenderError::Cancelled => Self::Interrupted,
             error => Self::Render(error),
+        }
+    }
+}
+
+impl From<EvaluateError> for LauncherError {
+    fn from(error: EvaluateError) -> Self {
+        match error {
+            EvaluateError::Scene(error) => Self::Scene(error),
+            EvaluateError::Render(error) => error.into(),
+            error @ EvaluateError::Point { .. } => Self::Usage(error.to_string()),
+            error => Self::Evaluate(error),
         }
     }
 }

@@ -6,6 +6,7 @@ pub(crate) mod check;
 pub(crate) mod clean;
 pub(crate) mod compare;
 pub(crate) mod default_run;
+pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod inspect;
 pub(crate) mod record;
@@ -40,6 +41,7 @@ pub(crate) fn dispatch(program: Program) -> Result<(), LauncherError> {
         Some(Command::Reference(args)) => reference::run(&args, global),
         Some(Command::Compare(args)) => compare::run(&args, global),
         Some(Command::Export(args)) => export::run(&args, global),
+        Some(Command::Evaluate(args)) => evaluate::run(&args, global),
         Some(Command::Inspect(args)) => inspect::run(&args, global),
         Some(Command::Record(args)) => record::run(&args, global),
         Some(Command::Replay(args)) => replay::run(&args, global),

@@ -1,0 +1,94 @@
+//! Turns a scene into streamed virtual surface lights, and those into a picture.
+
+use crate::{EvaluateError, point::Point};
+use photonstream_film::Film;
+use photonstream_renderer::{RenderOptions, VslSet, Watch};
+use photonstream_renderer_cpu::render;
+use photonstream_scene::{Sampling, Scene};
+use photonstream_simulator::{
+    emitters::Emitters,
+    ledger::{Ledger, PATHS_PER_TASK},
+    owner::OwnerTable,
+    placement::Placement,
+    records,
+    simulation::Simulation,
+    tracer::Tracer,
+};
+use std::{sync::Arc, time::Instant};
+
+/// Paper A draws 1.1 points for each light that stays, and shrinks triangles to 0.9.
+const PAPER_OVERSAMPLING: f64 = 1.1;
+const PAPER_SCALE: f32 = 0.9;
+
+/// Places lights for (number, seed, as paper A does), and how long that took, in ms.
+pub(super) fn place(scene: &Scene, (vsls, seed, is_as_paper): (u32, u64, bool)) -> (Simulation, f64) {
+    let mut scene = scene.clone();
+    (scene.streaming.vsls, scene.streaming.seed) = (vsls, seed);
+    let scene = Arc::new(scene);
+    let begun = Instant::now();
+    let simulation = if is_as_paper {
+        let mut placement = Placement::with(&scene, vsls, seed, PAPER_SCALE, PAPER_OVERSAMPLING);
+        let owners = Arc::new(OwnerTable::new(&scene, &placement));
+        placement.measure_areas(&scene, &owners);
+        let emitters = Arc::new(Emitters::new(&scene));
+        let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
+        Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer }
+    } else {
+        Simulation::new(scene)
+    };
+    (simulation, begun.elapsed().as_secs_f64() * 1e3)
+}
+
+/// The same lights with the pool, sampling and seed of `point`.
+pub(super) fn with_pool(base: &Simulation, point: &Point) -> Simulation {
+    let mut scene = Scene::clone(&base.scene);
+    let streaming = &mut scene.streaming;
+    (streaming.pool_paths, streaming.sampling, streaming.seed) = (point.pool, point.sampling, point.seed);
+    // Refining goes on for as long as it takes; here a pool is a pool.
+    streaming.target_error = 0.0;
+    with_scene_and_pool(base, scene)
+}
+
+/// The same lights in `scene`, with the pool that its settings ask for.
+pub(crate) fn with_scene_and_pool(base: &Simulation, scene: Scene) -> Simulation {
+    let scene = Arc::new(scene);
+    let emitters = Arc::new(Emitters::new(&scene));
+    let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&base.owners), Arc::clone(&emitters));
+    Simulation { scene, emitters, tracer, ..base.clone() }
+}
+
+/// Fills the pool and reads the flux: the lights, and the time in ms. A stream of fresh samples is timed, and read, in its
+/// second turn, when all its slots hold a path to be replaced.
+pub(crate) fn lights_of(simulation: &Simulation) -> Result<(VslSet, f64), EvaluateError> {
+    let mut begun = Instant::now();
+    let mut ledger = simulation.fill();
+    if simulation.scene.streaming.sampling == Sampling::Fresh {
+        begun = Instant::now();
+        simulation.advance(&mut ledger, tasks(simulation));
+    }
+    let vsls = vsls_of(simulation, &ledger)?;
+    Ok((vsls, begun.elapsed().as_secs_f64() * 1e3))
+}
+
+/// Tasks that are a turn of the whole pool.
+pub(crate) fn tasks(simulation: &Simulation) -> u64 {
+    let lights = simulation.emitters.lights.iter();
+    lights.map(|l| u64::from((l.slots.end - l.slots.start).div_ceil(PATHS_PER_TASK))).sum()
+}
+
+/// What renderers get of the present state of `ledger`.
+pub(crate) fn vsls_of(simulation: &Simulation, ledger: &Ledger) -> Result<VslSet, EvaluateError> {
+    let mut vsls = records::vsl_records(&simulation.scene, &simulation.placement);
+    records::write_flux(&mut vsls, ledger.readings(&simulation.scene), 0);
+    Ok(VslSet::from_records(&vsls)?)
+}
+
+/// A picture of the light of `simulation`, its pool filled.
+pub(crate) fn render_streamed(
+    simulation: &Simulation,
+    options: &RenderOptions,
+    watch: Watch<'_>,
+) -> Result<Film, EvaluateError> {
+    let (vsls, _) = lights_of(simulation)?;
+    Ok(render(&simulation.scene, &vsls, options, watch)?.film)
+}

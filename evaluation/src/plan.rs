@@ -1,0 +1,182 @@
+//! Turns a scene into the points to measure: sweeps of one setting each, and the methods to compare with.
+
+use crate::point::{Method, Point};
+use photonstream_scene::{Sampling, Visibility};
+use photonstream_shading::Kernel;
+
+/// A point, and the sweep that it is for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// Names of the sweeps, separated by spaces.
+    pub sweeps: String,
+    /// What to measure.
+    pub point: Point,
+}
+
+/// How thorough it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// Few points, small pictures: half a minute a scene.
+    Quick,
+    /// Some minutes a scene.
+    Default,
+}
+
+impl Effort {
+    /// Pixels of a picture, where no size is asked for.
+    pub fn pixels(self) -> u32 {
+        match self {
+            Self::Quick => 64 * 64,
+            Self::Default => 128 * 128,
+        }
+    }
+
+    /// Paths per pixel of the reference.
+    pub fn reference_spp(self) -> u64 {
+        match self {
+            Self::Quick => 256,
+            Self::Default => 1024,
+        }
+    }
+
+    /// Path tracing gets no more time than this, in ms.
+    pub fn longest_ms(self) -> f64 {
+        match self {
+            Self::Quick => 1e3,
+            Self::Default => 1e4,
+        }
+    }
+
+    fn vsls(self) -> &'static [u32] {
+        match self {
+            Self::Quick => &[50, 200, 1000],
+            Self::Default => &[50, 200, 1000, 4000],
+        }
+    }
+
+    fn pools(self) -> &'static [u32] {
+        match self {
+            Self::Quick => &[1 << 10, 1 << 13, 1 << 16],
+            Self::Default => &[1 << 10, 1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20],
+        }
+    }
+
+    /// Lights and pools that grow together: few of both are fast.
+    fn pairs(self) -> &'static [(u32, u32)] {
+        match self {
+            Self::Quick => &[(50, 1 << 10), (200, 1 << 13), (1000, 1 << 16)],
+            Self::Default => &[
+                (25, 1 << 9),
+                (50, 1 << 10),
+                (100, 1 << 12),
+                (200, 1 << 13),
+                (500, 1 << 15),
+                (1000, 1 << 16),
+                (2000, 1 << 17),
+            ],
+        }
+    }
+}
+
+/// The sweep of everything that is compared by time.
+pub const TIME: &str = "time";
+/// The sweep of the number of virtual surface lights.
+pub const VSLS: &str = "vsls";
+/// The sweep of the size of the pool.
+pub const POOL: &str = "pool";
+/// The sweep of kernels and visibilities.
+pub const SHADING: &str = "kernel-visibility";
+/// The sweep of the ways to sample.
+pub const SAMPLING: &str = "sampling";
+/// The sweep of threads.
+pub const THREADS: &str = "threads";
+/// The scene as its config says.
+pub const CONFIG: &str = "config";
+
+/// All points of a scene but those of path tracing, which go on until the time is over. `base` is the scene as its config
+/// says; equal points are measured once.
+pub fn plan(base: &Point, effort: Effort) -> Vec<Planned> {
+    let mut planned: Vec<Planned> = Vec::new();
+    let mut add = |sweep: &str, point: Point| {
+        let text = point.to_string();
+        match planned.iter_mut().find(|p| p.point.to_string() == text) {
+            Some(known) if known.sweeps.split(' ').any(|s| s == sweep) => {}
+            Some(known) => known.sweeps = format!("{} {sweep}", known.sweeps),
+            None => planned.push(Planned { sweeps: sweep.to_owned(), point }),
+        }
+    };
+    add(CONFIG, base.clone());
+    for &kernel in Kernel::ALL.iter() {
+        for &visibility in Visibility::ALL {
+            add(SHADING, Point { kernel, visibility, ..base.clone() });
+        }
+    }
+    for &visibility in Visibility::ALL {
+        for &(vsls, pool) in effort.pairs() {
+            add(TIME, Point { vsls, pool, visibility, ..base.clone() });
+        }
+    }
+    for &kernel in Kernel::ALL.iter() {
+        for &vsls in effort.vsls() {
+            add(VSLS, Point { vsls, kernel, ..base.clone() });
+        }
+    }
+    for &pool in effort.pools() {
+        add(POOL, Point { pool, ..base.clone() });
+    }
+    for &sampling in Sampling::ALL {
+        add(SAMPLING, Point { sampling, ..base.clone() });
+    }
+    let threads = std::iter::successors(Some(1), |n| Some(n * 2)).take_while(|&n| n < base.threads);
+    for threads in threads.chain([base.threads]) {
+        add(THREADS, Point { threads, ..base.clone() });
+    }
+    for method in [Method::InstantRadiosity, Method::InstantRadiosityBounded] {
+        for vsls in effort.vsls().iter().map(|n| n / 4) {
+            add(TIME, Point { method, vsls, visibility: Visibility::Rays, ..base.clone() });
+        }
+    }
+    for &vsls in effort.vsls() {
+        add(TIME, Point { method: Method::PaperA, vsls, ..base.clone() });
+    }
+    planned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn base() -> Point {
+        Point {
+            method: Method::PhotonStreaming,
+            vsls: 1000,
+            pool: 1 << 16,
+            kernel: Kernel::Disc,
+            visibility: Visibility::Rays,
+            sampling: Sampling::Replay,
+            light_samples: 16,
+            spp: 64,
+            threads: 2,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn every_kernel_visibility_and_method_is_there_once() {
+        let planned = plan(&base(), Effort::Default);
+        let texts: Vec<String> = planned.iter().map(|p| p.point.to_string()).collect();
+        for (i, text) in texts.iter().enumerate() {
+            assert!(!texts[..i].contains(text), "{text} is measured twice");
+        }
+        let has = |what: &dyn Fn(&Point) -> bool| planned.iter().any(|p| what(&p.point));
+        assert!(Kernel::ALL.iter().all(|&k| has(&|p| p.kernel == k)));
+        assert!(Visibility::ALL.iter().all(|&v| has(&|p| p.visibility == v)));
+        assert!(Method::ALL.iter().filter(|&&m| m != Method::PathTracing).all(|&m| has(&|p| p.method == m)));
+        // The config's own point is in every sweep of one setting.
+        let own = &planned[0];
+        assert_eq!(own.point, base());
+        for sweep in [CONFIG, SHADING, TIME, VSLS, POOL, SAMPLING, THREADS] {
+            assert!(own.sweeps.split(' ').any(|s| s == sweep), "{sweep}: {}", own.sweeps);
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Evaluates a scene with tiny pictures from its config to the page, and opens the page in a browser.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+use photonstream_evaluation::{EvaluateError, Observer, Options, evaluate, plan::Effort, results::Results};
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
+};
+
+fn options(out: &Path, points: &[&str]) -> Options {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/cornell-ball.toml");
+    Options {
+        configs: vec![config],
+        out: out.to_owned(),
+        cache: out.join("cache"),
+        effort: Effort::Quick,
+        size: Some((24, 24)),
+        reference_spp: Some(32),
+        threads: Some(2),
+        seed: None,
+        points: points.iter().map(|&p| p.to_owned()).collect(),
+    }
+}
+
+fn run(options: &Options) -> Results {
+    let cancelled = AtomicBool::new(false);
+    evaluate(options, Observer { progress: &|_, _| {}, cancelled: &cancelled }).unwrap()
+}
+
+/// Everything at once: rows of every method, splits, changes; tables, and a page that a browser shows.
+#[test]
+fn from_config_to_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let results = run(&options(out, &[]));
+    assert!(results.complete);
+    let methods =
+        ["photon-streaming", "path-tracing", "instant-radiosity", "instant-radiosity-bounded", "paper-a"];
+    for method in methods {
+        assert!(results.rows.iter().any(|r| r.method == method && r.rel_rmse > 0.0), "{method}");
+    }
+    for row in &results.rows {
+        let finite = [row.rel_rmse, row.rel_rmse_indirect, row.rel_mse, row.bias, row.worst_1pct, row.flip];
+        assert!(finite.iter().all(|x| x.is_finite()), "{row:?}");
+        assert!(row.total_ms > 0.0 && row.command.contains("--point"), "{row:?}");
+        assert!(!row.commit.is_empty() && row.scene_hash.len() == 16, "{row:?}");
+    }
+    assert!(results.splits.iter().any(|s| s.visibility == "none" && s.visibility_part > 0.0));
+    assert!(!results.changes.is_empty());
+    // What the renderer cannot do is named.
+    assert!(results.skipped.iter().any(|s| s.what.contains("visibility ao")), "{:?}", results.skipped);
+    let lines = std::fs::read_to_string(out.join("results.csv")).unwrap().lines().count();
+    assert_eq!(lines, results.rows.len() + 1);
+    let page = std::fs::read_to_string(out.join("index.html")).unwrap();
+    if let Some(kept) = std::env::var_os("PHOTONSTREAM_KEEP_REPORT") {
+        std::fs::write(kept, &page).unwrap();
+    }
+    for part in ["<svg", "data:image/png;base64,", "prefers-color-scheme", "Pareto", "What was left out"] {
+        assert!(page.contains(part), "{part}");
+    }
+    let text = page.replace("http://www.w3.org/2000/svg", "");
+    for outside in ["http://", "https://", "<script", "url("] {
+        assert!(!text.contains(outside), "the page reaches for {outside}");
+    }
+    opens_in_a_browser(&out.join("index.html"));
+}
+
+/// The command in a row measures the same picture again.
+#[test]
+fn a_point_is_repeated_by_its_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let texts = [
+        "photon-streaming:vsls=60,pool=1024,kernel=disc,visibility=rays,sampling=replay,light_samples=4,threads=2,seed=3",
+        "paper-a:vsls=60,pool=1024,threads=1",
+        "instant-radiosity:vsls=40",
+        "path-tracing:spp=4",
+    ];
+    let first = run(&options(folder.path(), &texts));
+    let again: Vec<String> =
+        first.rows.iter().map(|row| row.command.split("--point ").nth(1).unwrap().to_owned()).collect();
+    let again: Vec<&str> = again.iter().map(String::as_str).collect();
+    let second = run(&options(folder.path(), &again));
+    assert_eq!(first.rows.len(), texts.len());
+    for (a, b) in first.rows.iter().zip(&second.rows) {
+        assert_eq!((a.rel_rmse, a.flip, &a.command), (b.rel_rmse, b.flip, &b.command));
+    }
+    let error = evaluate(
+        &options(folder.path(), &["path-tracing:vsls=3"]),
+        Observer { progress: &|_, _| {}, cancelled: &AtomicBool::new(false) },
+    );
+    assert!(matches!(error, Err(EvaluateError::Point { .. })));
+}
+
+/// Stopped when it begins the third point, it leaves the two that it has.
+#[test]
+fn an_interrupted_evaluation_leaves_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let cancelled = AtomicBool::new(false);
+    let points = AtomicUsize::new(0);
+    let progress = |_: f64, what: &str| {
+        if what.starts_with("photon-streaming") && points.fetch_add(1, Ordering::Relaxed) == 2 {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    };
+    let observer = Observer { progress: &progress, cancelled: &cancelled };
+    let error = evaluate(&options(folder.path(), &[]), observer).unwrap_err();
+    assert!(error.is_cancelled(), "{error}");
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("results.json")).unwrap()).unwrap();
+    assert_eq!(json["complete"], false);
+    assert_eq!(json["rows"].as_array().unwrap().len(), 2);
+    assert!(std::fs::read_to_string(folder.path().join("index.html")).unwrap().contains("was interrupted"));
+}
+
+/// A picture of the page, light and dark: not blank, and nothing on the console. Without Chromium it is a loud SKIP, or a
+/// failure where PHOTONSTREAM_REQUIRE_CHROMIUM=1.
+fn opens_in_a_browser(page: &Path) {
+    let Some(browser) = chromium() else {
+        let required = std::env::var("PHOTONSTREAM_REQUIRE_CHROMIUM").is_ok_and(|v| v == "1");
+        assert!(!required, "PHOTONSTREAM_REQUIRE_CHROMIUM=1, and no chromium is in the PATH");
+        eprintln!("SKIP: no chromium in the PATH (Debian package chromium): the page was not opened");
+        return;
+    };
+    let mut means = Vec::new();
+    // 1 is light and 0 is dark in Chromium's own settings.
+    for (scheme, name) in [("1", "light"), ("0", "dark")] {
+        let folder = page.parent().unwrap();
+        let picture = folder.join(format!("{name}.png"));
+        let output = Command::new(&browser)
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--hide-scrollbars",
+                "--window-size=1280,3000",
+            ])
+            .args(["--enable-logging=stderr", "--v=0"])
+            .arg(format!("--blink-settings=preferredColorScheme={scheme}"))
+            .arg(format!("--user-data-dir={}", folder.join(format!("profile-{name}")).display()))
+            .arg(format!("--screenshot={}", picture.display()))
+            .arg(format!("file://{}", page.canonicalize().unwrap().display()))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let console: Vec<&str> = said.lines().filter(|line| line.contains("CONSOLE")).collect();
+        assert!(console.is_empty(), "{console:?}");
+        let image = image::open(&picture).unwrap_or_else(|e| panic!("{e}: {said}")).to_luma8();
+        assert_eq!(image.dimensions(), (1280, 3000));
+        let pixels = image.as_raw();
+        let mean = pixels.iter().map(|&p| f64::from(p)).sum::<f64>() / pixels.len() as f64;
+        let other = pixels.iter().filter(|&&p| (f64::from(p) - mean).abs() > 40.0).count();
+        // Text, lines and pictures: more than one pixel in a hundred is far from the mean.
+        assert!(other > pixels.len() / 100, "{name}: {other} of {} pixels differ from {mean}", pixels.len());
+        means.push(mean);
+    }
+    assert!(means[0] > means[1] + 100.0, "light and dark look alike: {means:?}");
+}
+
+fn chromium() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    std::env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|file| file.is_file())
+}

@@ -1,0 +1,123 @@
+//! Turns scenes into speed against error: tables and a page.
+
+use crate::{cli::Global, error::LauncherError, output, progress::Share, signals::Listener};
+use photonstream_evaluation::{Observer, Options, evaluate, plan::Effort};
+use photonstream_renderer::cli::Size;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `photonstream evaluate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Writes results.csv, results.json and index.html, a page that needs no network, into DIR. An interrupted evaluation leaves what
+was measured until then. References are kept, and found again by scene, size and paths per pixel.
+
+Examples:
+  photonstream evaluate configs/cornell-box.toml --out out/evaluation
+  photonstream evaluate configs/cornell-box.toml configs/two-rooms.toml --out out/evaluation --quick
+  photonstream evaluate configs/cornell-box.toml --out again --point photon-streaming:vsls=200,visibility=none
+
+JSON: { \"complete\", \"seconds\", \"points\", \"page\", \"csv\", \"json\": paths, \"cpu\", \"cores\", \"commit\", \"skipped\": [ { \"what\",
+  \"why\" } ] }; every measured figure is in results.json, under the names of the columns of results.csv")]
+pub(crate) struct Args {
+    /// Scenes to evaluate
+    #[arg(required = true, value_name = "CONFIG")]
+    configs: Vec<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Small pictures and few points: a first look
+    #[arg(long)]
+    quick: bool,
+    /// Size of the pictures [default: the scene's proportions with 16 384 pixels, or 4 096 with --quick]
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+    /// Paths per pixel of the reference [default: 1024, or 256 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
+    spp: Option<u64>,
+    /// Threads [default: one per core]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
+    /// Seed of all samples [default: the scene's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Measure this alone: METHOD or METHOD:KEY=VALUE,… as results.csv names it; repeat for more
+    #[arg(long, value_name = "POINT")]
+    point: Vec<String>,
+    /// Folder where references are kept [default: the user's cache folder, else DIR/cache]
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    complete: bool,
+    seconds: f64,
+    points: usize,
+    page: PathBuf,
+    csv: PathBuf,
+    json: PathBuf,
+    cpu: String,
+    cores: usize,
+    commit: String,
+    skipped: Vec<photonstream_evaluation::results::Skipped>,
+}
+
+pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
+    let options = Options {
+        configs: args.configs.clone(),
+        out: args.out.clone(),
+        cache: args.cache.clone().or_else(user_cache).unwrap_or_else(|| args.out.join("cache")),
+        effort: if args.quick { Effort::Quick } else { Effort::Default },
+        size: args.size.map(|size| (size.width, size.height)),
+        reference_spp: args.spp,
+        threads: args.threads.map(|n| n as usize),
+        seed: args.seed,
+        points: args.point.clone(),
+    };
+    let cancelled = Listener::flag_only()?;
+    let bar = Share::start("evaluation");
+    let progress = |share: f64, what: &str| {
+        bar.set(share);
+        bar.say(what.to_owned());
+    };
+    let measured = evaluate(&options, Observer { progress: &progress, cancelled: &cancelled });
+    drop(bar);
+    let page = args.out.join("index.html");
+    let results = measured.inspect_err(|_| {
+        if page.exists() {
+            tracing::warn!("{} has what was measured until then", page.display());
+        }
+    })?;
+    let report = Report {
+        complete: results.complete,
+        seconds: results.seconds,
+        points: results.rows.len(),
+        page,
+        csv: args.out.join("results.csv"),
+        json: args.out.join("results.json"),
+        cpu: results.machine.cpu,
+        cores: results.machine.cores,
+        commit: results.machine.commit,
+        skipped: results.skipped,
+    };
+    output::report(global.json, &report, text)
+}
+
+/// `$XDG_CACHE_HOME/photonstream`, else `~/.cache/photonstream`.
+fn user_cache() -> Option<PathBuf> {
+    let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let base = folder("XDG_CACHE_HOME").or_else(|| folder("HOME").map(|home| home.join(".cache")))?;
+    base.is_absolute().then(|| base.join("photonstream"))
+}
+
+fn text(report: &Report) -> String {
+    format!(
+        "{}\n{}\n{}\n{} points measured in {:.0} s",
+        report.page.display(),
+        report.csv.display(),
+        report.json.display(),
+        report.points,
+        report.seconds
+    )
+}
