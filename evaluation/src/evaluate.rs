@@ -188,8 +188,12 @@ impl Run<'_> {
         let point = &planned.point;
         let shot = match self.bench.shoot(point, self.observer.watch()) {
             Ok(shot) => shot,
-            Err(EvaluateError::Render(error @ RenderError::Option { .. })) => {
-                let what = format!("visibility {}, kernel {}", point.visibility.name(), point.kernel.name());
+            Err(EvaluateError::Render(error @ RenderError::Option { option, .. })) => {
+                let what = match option {
+                    "visibility" => format!("visibility {}", point.visibility.name()),
+                    "kernel" => format!("kernel {}", point.kernel.name()),
+                    _ => point.to_string(),
+                };
                 self.skip(what, error.to_string());
                 return Ok(None);
             }

@@ -83,7 +83,8 @@ fn swatch(series: &Series) -> String {
 fn range(values: impl Iterator<Item = f64> + Clone) -> Range<f64> {
     let low = values.clone().fold(f64::INFINITY, f64::min).log10();
     let high = values.fold(0.0, f64::max).log10();
-    low - 0.12..high.max(low + 0.4) + 0.12
+    let more = 0.5 * (0.4 - (high - low)).max(0.0) + 0.12;
+    low - more..high + more
 }
 
 /// Logarithms of round numbers in `range`, at most `most` of them: 1, 2, 5 of each decade, or powers of ten.

@@ -105,7 +105,9 @@ fn settings_charts(rows: &[&Row], sheet: &SceneSheet) -> Result<String, Evaluate
         out.push_str(&tables::sweep("Kernel, visibility", &shading, name));
         let sampling = of_sweep(rows, plan::SAMPLING);
         out.push_str(&tables::sweep("Sampling", &sampling, |r| r.sampling.clone().unwrap_or_default()));
-        out.push_str(&tables::sweep("Threads", &of_sweep(rows, plan::THREADS), |r| r.threads.to_string()));
+        let mut threads = of_sweep(rows, plan::THREADS);
+        threads.sort_by_key(|row| row.threads);
+        out.push_str(&tables::sweep("Threads", &threads, |r| r.threads.to_string()));
     }
     Ok(out)
 }
