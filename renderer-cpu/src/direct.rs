@@ -16,8 +16,8 @@ pub(crate) fn irradiance(
     u: [f32; 2],
     rays: &mut u64,
 ) -> Vec3 {
-    let Some(Illumination { wi, distance, irradiance }) = light.shape.illuminate(surface.ray_origin, u)
-    else {
+    // Where the surface is, not where its rays start: a lamp may be nearer than a few times the way between.
+    let Some(Illumination { wi, distance, irradiance }) = light.shape.illuminate(surface.position, u) else {
         return Vec3::ZERO;
     };
     let cos_theta = surface.normal.dot(wi);
@@ -25,7 +25,12 @@ pub(crate) fn irradiance(
         return Vec3::ZERO;
     }
     *rays += 1;
-    let ray = Ray { origin: surface.ray_origin, direction: wi, t_max: distance * SHADOW_REACH };
+    let (direction, t_max) = if distance.is_finite() {
+        (wi * distance - (surface.ray_origin - surface.position), SHADOW_REACH)
+    } else {
+        (wi, f32::INFINITY)
+    };
+    let ray = Ray { origin: surface.ray_origin, direction, t_max };
     if scene.bvh.occluded(&ray) { Vec3::ZERO } else { light.power * (irradiance * cos_theta) }
 }
 

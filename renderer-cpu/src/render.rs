@@ -73,7 +73,7 @@ pub fn render_with(
     // Summed in the order of the tiles: the same on any number of threads.
     let (skipped, indirect) =
         tiles.iter().fold((0.0, 0.0), |(s, i), tile| (s + tile.skipped, i + tile.indirect));
-    stats.range_loss_share = if indirect > 0.0 { skipped / indirect } else { 0.0 };
+    stats.range_loss_share = if skipped > 0.0 { skipped / indirect } else { 0.0 };
     stats.vsls = vsls.len() as u64;
     stats.render_ms = start.elapsed().as_secs_f64() * 1e3;
     let mut rendered = Rendered { film, stats };

@@ -29,7 +29,8 @@ pub struct RenderStats {
     /// Number of virtual surface lights.
     pub vsls: u64,
     /// What the range of the lights may have lost at most, as a share of the indirect light of the picture: the sum
-    /// of the upper bounds of all that was skipped over the sum of what was found. 0 where nothing was skipped.
+    /// of the upper bounds of all that was skipped over the sum of what was found. 0 where nothing was skipped, infinite
+    /// (`null` in JSON) where nothing was found.
     pub range_loss_share: f64,
     /// Standard error of the indirect light as rel. RMSE, where shadow rays went to some of the virtual surface lights
     /// only; `None` where nothing was drawn by lot.

@@ -3,6 +3,7 @@
 use crate::RenderError;
 use glam::Vec3;
 use photonstream_protocol::VslRecord;
+use photonstream_scene::config::MAX_LENGTH_M;
 
 /// A virtual surface light: the light that leaves one patch of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +34,7 @@ impl VslSet {
     /// The lights of a published frame.
     ///
     /// # Errors
-    /// [`RenderError::Vsl`] for a value that is not finite, a negative area or flux, a normal that is not of unit
+    /// [`RenderError::Vsl`] for a value that is not finite, a place beyond 10⁹ m, a negative area or flux, a normal that is not of unit
     /// length.
     pub fn from_records(records: &[VslRecord]) -> Result<Self, RenderError> {
         Self::new(records.iter().map(|r| Vsl {
@@ -120,10 +121,15 @@ impl VslSet {
     }
 }
 
+/// Largest coordinate of a scene, m, and a little for rounding.
+const MAX_COORDINATE_M: f32 = MAX_LENGTH_M as f32 * 1.000_01;
+
 fn check(index: usize, vsl: &Vsl) -> Result<(), RenderError> {
     let wrong = |field, found: String, expected| Err(RenderError::Vsl { index, field, found, expected });
-    if !vsl.position.is_finite() {
-        return wrong("position", vsl.position.to_string(), "finite metres");
+    // Beyond it the fourth power of a distance would leave f32, and the kernels with it.
+    let is_near = vsl.position.is_finite() && vsl.position.abs().max_element() <= MAX_COORDINATE_M;
+    if !is_near {
+        return wrong("position", vsl.position.to_string(), "numbers within ±1e9 m");
     }
     // The rounding of three components stays far below this.
     let is_unit = (vsl.normal.length_squared() - 1.0).abs() < 1e-4;
@@ -150,6 +156,7 @@ mod tests {
         assert_eq!((set.len(), set.get(1), set.get(2)), (2, Some(good), None));
         for (bad, field) in [
             (Vsl { position: Vec3::NAN, ..good }, "position"),
+            (Vsl { position: Vec3::X * 1e20, ..good }, "position"),
             (Vsl { normal: Vec3::splat(1.0), ..good }, "normal"),
             (Vsl { normal: Vec3::NAN, ..good }, "normal"),
             (Vsl { flux: Vec3::new(0.0, -1.0, 0.0), ..good }, "flux"),
