@@ -105,6 +105,7 @@ fn left_out() -> Vec<Skipped> {
             "the GPU renderer",
             "figures here are of processor cores, which every method uses in the same way",
         ),
+        skipped("accumulation (splat, tiled)", "a choice of the GPU renderer alone"),
         skipped(
             "HDR-FLIP",
             "FLIP is measured on the tone-mapped picture: the library has the variant for displays alone",

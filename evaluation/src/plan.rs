@@ -35,7 +35,7 @@ impl Effort {
     pub fn reference_spp(self) -> u64 {
         match self {
             Self::Quick => 256,
-            Self::Default => 1024,
+            Self::Default => 4096,
         }
     }
 

@@ -139,3 +139,36 @@ fn text(report: &Report) -> String {
     report.maps.iter().for_each(|path| out.push_str(&format!("{}\n", path.display())));
     out
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn maps_are_pictures_of_the_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let film = |name: &str, value: f32| {
+            let mut film = Film::new(16, 8).unwrap();
+            film.push("full", vec![[value; 3].into(); 128]).unwrap();
+            let path = folder.path().join(name);
+            film.write_exr(&path).unwrap();
+            path
+        };
+        let args = Args {
+            picture: film("a.exr", 2.0),
+            reference: film("b.exr", 1.0),
+            layer: None,
+            maps: Some(folder.path().join("new/maps")),
+            exposure: 0.0,
+            tone_map: ToneMap::Aces,
+        };
+        run(&args, &Global { verbose: 0, quiet: 0, json: true }).unwrap();
+        for name in ["signed-error.png", "flip.png"] {
+            let png = std::fs::read(folder.path().join("new/maps").join(name)).unwrap();
+            // The signature of PNG, then width and height in the header.
+            assert_eq!((&png[1..4], &png[16..24]), (&b"PNG"[..], &[0, 0, 0, 16, 0, 0, 0, 8][..]), "{name}");
+        }
+    }
+}

@@ -32,7 +32,7 @@ pub(crate) struct Args {
     /// Size of the pictures [default: the scene's proportions with 16 384 pixels, or 4 096 with --quick]
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
-    /// Paths per pixel of the reference [default: 1024, or 256 with --quick]
+    /// Paths per pixel of the reference [default: 4096, or 256 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
     spp: Option<u64>,
     /// Threads [default: one per core]
