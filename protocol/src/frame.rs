@@ -39,6 +39,8 @@ pub struct VslFrame {
     pub scene_text: Arc<str>,
     /// Patches of the virtual surface lights: one for each, or none at all.
     pub patches: Vec<PatchRecord>,
+    /// Frame in which each chunk of [`CHUNK_RECORDS`] patches last changed.
+    pub patch_chunk_frames: Vec<u64>,
     /// What is wrong with the simulation, empty while nothing is; the same allocation for as long as it stays the same.
     pub notice: Arc<str>,
 }
@@ -182,6 +184,7 @@ impl FramePair {
             self.patch.clear();
         }
         back.frame.chunk_frames.clone_from(&back.versions[VSL]);
+        back.frame.patch_chunk_frames.clone_from(&back.versions[PATCH]);
         let frame = &mut back.frame;
         frame.scene_text = text;
         frame.notice = notice;

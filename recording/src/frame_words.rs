@@ -109,6 +109,8 @@ impl FrameWords {
         frame.chunk_frames.clear();
         frame.chunk_frames.extend(frame.vsls.iter().step_by(CHUNK_RECORDS).map(|vsl| vsl.changed_frame));
         frame.patches = records(patches);
+        // Nothing is known of when they changed.
+        frame.patch_chunk_frames.clear();
         frame.objects = records(objects);
         frame.lights = records(lights);
         frame.statistics = records(counters).first().copied().ok_or("no statistics")?;

@@ -3,7 +3,7 @@
 use crate::tile::Tile;
 use core::f32::consts::PI;
 use glam::Vec3;
-use photonstream_renderer::VslSet;
+use photonstream_renderer::{Patch, VslSet};
 use photonstream_shading::kernel::{Kernel, range_sq};
 
 /// A virtual surface light as the gathering loop reads it.
@@ -28,6 +28,8 @@ pub(crate) struct Selection {
     pub(crate) near: Vec<Emitter>,
     /// Lights whose range ends within the tile.
     pub(crate) partial: Vec<Emitter>,
+    /// Lights whose polygons some of the tile may see.
+    pub(crate) patched: Vec<(Emitter, Patch)>,
     /// Sum over receivers of the upper bounds of what was skipped with whole tiles, in W m⁻² sr⁻¹.
     pub(crate) skipped: f64,
 }
@@ -50,6 +52,7 @@ impl Culling {
     pub(crate) fn select(&self, vsls: &VslSet, tile: &Tile, selection: &mut Selection) {
         selection.near.clear();
         selection.partial.clear();
+        selection.patched.clear();
         selection.skipped = 0.0;
         if tile.receivers == 0 {
             return;
@@ -78,6 +81,10 @@ impl Culling {
                 range_sq,
                 bound,
             };
+            if let Some(patch) = vsls.patch(index).filter(|p| self.kernel.is_near(nearest_sq, p.area)) {
+                selection.patched.push((emitter, *patch));
+                continue;
+            }
             let farthest_sq = lo.abs().max(hi.abs()).length_squared();
             // A tile that ends just at the range, within rounding, is treated pixel by pixel.
             if farthest_sq < range_sq * (1.0 - 1e-5) {

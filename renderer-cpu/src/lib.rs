@@ -9,6 +9,7 @@ mod cull;
 mod direct;
 mod gather;
 mod owner;
+mod patched;
 pub mod reference;
 mod render;
 mod shadowed;

@@ -5,7 +5,7 @@ use crate::{
     cull::{Culling, Selection},
     direct, gather,
     owner::Owners,
-    shadowed,
+    patched, shadowed,
     surface::{self, Surface},
     threads::on_threads,
     tile::{TILE_EDGE, Tile},
@@ -93,7 +93,7 @@ impl FrameRenderer for CpuRenderer {
         options: &RenderOptions,
         watch: Watch<'_>,
     ) -> Result<Rendered, RenderError> {
-        let mut rendered = render(scene, &VslSet::from_records(&frame.vsls)?, options, watch)?;
+        let mut rendered = render(scene, &VslSet::from_frame(frame)?, options, watch)?;
         rendered.describe(scene, Some(frame), options);
         Ok(rendered)
     }
@@ -211,7 +211,8 @@ impl<'a> Frame<'a> {
         result.skipped += selection.skipped;
         match self.options.visibility {
             Visibility::None | Visibility::Ao => {
-                result.skipped += gather::accumulate(self.instructions, selection, tile)
+                result.skipped += gather::accumulate(self.instructions, selection, tile);
+                result.skipped += patched::accumulate(selection, tile);
             }
             Visibility::Rays => {
                 let shadowed = shadowed::accumulate(self.scene, &self.culling, selection, tile);

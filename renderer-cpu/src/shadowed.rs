@@ -2,6 +2,7 @@
 
 use crate::{
     cull::{Culling, Emitter, Selection},
+    patched,
     tile::Tile,
 };
 use glam::Vec3;
@@ -52,6 +53,33 @@ pub(crate) fn accumulate(
             let ray = Ray { origin: surface.ray_origin, direction, t_max: SHADOW_REACH };
             if !scene.bvh.occluded(&ray) {
                 tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * transfer);
+            }
+        }
+    }
+    for (light, patch) in &selection.patched {
+        for i in 0..tile.used {
+            let normal = tile.normal.get(i);
+            let d = light.position - tile.position.get(i);
+            let Some(surface) = &tile.surfaces[i] else { continue };
+            let seen = patched::seen(light, patch, d, light.position - surface.ray_origin, normal);
+            if seen.transfer == 0.0 {
+                continue;
+            }
+            let r_sq = d.length_squared();
+            if r_sq > light.range_sq {
+                result.skipped += f64::from(light.bound / r_sq);
+                continue;
+            }
+            result.rays += 1;
+            // To the middle of what is above the horizon: the light's own place may lie below it.
+            let target = surface.ray_origin + seen.middle - light.inverse_normal * offset;
+            let ray = Ray {
+                origin: surface.ray_origin,
+                direction: target - surface.ray_origin,
+                t_max: SHADOW_REACH,
+            };
+            if !scene.bvh.occluded(&ray) {
+                tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * seen.transfer);
             }
         }
     }

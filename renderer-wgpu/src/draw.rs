@@ -17,6 +17,7 @@ use crate::{
 use glam::Vec3;
 use photonstream_renderer::Watch;
 use photonstream_scene::Visibility;
+use photonstream_shading::Kernel;
 
 /// What a call of [`Renderer::draw`] did.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,6 +51,14 @@ impl Renderer {
     /// As [`Renderer::draw`].
     pub fn draw_watched(&mut self, view: &View, watch: Watch<'_>) -> Result<Drawn, GpuError> {
         view.validate()?;
+        if view.kernel == Kernel::Patch && self.vsls.lacks_patches {
+            return Err(GpuError::Unsupported {
+                option: "kernel patch".into(),
+                adapter: self.gpu.name(),
+                lacks: "polygons: an imported segment brings the lights alone".into(),
+                remedy: "choose --kernel disc, or upload the frame",
+            });
+        }
         self.gpu.check()?;
         let scope = self.gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let result = self.draw_changes(view, watch);
@@ -120,6 +129,7 @@ impl Renderer {
                     gbuffer: &targets.gbuffer.view,
                     size,
                     lights: &self.maps.lights,
+                    patches: &self.maps.lights,
                     count: scene.lights.len() as u32,
                     sample: view.sample,
                     output: &targets.direct.view,
@@ -152,6 +162,7 @@ impl Renderer {
                     gbuffer: &targets.gbuffer.view,
                     size,
                     lights: &self.vsls.lights,
+                    patches: &self.vsls.patches,
                     count: self.vsls.count,
                     sample: view.sample,
                     output: &targets.indirect.view,
@@ -167,7 +178,13 @@ impl Renderer {
             } else if !by_rays {
                 let (accumulation, interleave) = (view.accumulation, view.interleave);
                 let listed = ranged || view.show == Show::Tiles;
-                let gathering = Gathering { accumulation, ranged, interleave, listed };
+                let gathering = Gathering {
+                    accumulation,
+                    ranged,
+                    interleave,
+                    listed,
+                    patches: view.kernel == Kernel::Patch,
+                };
                 self.gather.encode(&mut scope, targets, &scene.geometry, &self.vsls, gathering, sees)?;
             }
             done.set(Stage::Indirect, view, versions);

@@ -9,6 +9,7 @@ use crate::{
 use glam::Vec3;
 use photonstream_renderer::LayerKind;
 use photonstream_shading::Camera;
+use photonstream_shading::Kernel;
 
 /// The numbers of `view`.
 pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUniform {
@@ -44,7 +45,7 @@ pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUn
         epsilon: view.epsilon,
         albedo_max: scene.albedo_max,
         magnitude: scene.magnitude,
-        area_factor: view.kernel.area_term(1.0),
+        area_factor: if view.kernel == Kernel::Patch { -1.0 } else { view.kernel.area_term(1.0) },
         interleave: view.interleave,
         vsls,
         lights: scene.lights.len() as u32,

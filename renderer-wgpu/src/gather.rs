@@ -23,6 +23,7 @@ struct Variant {
     ranged: bool,
     continues: bool,
     interleaved: bool,
+    patches: bool,
 }
 
 /// How the lights of a picture are gathered.
@@ -35,6 +36,8 @@ pub(crate) struct Gathering {
     pub(crate) interleave: u32,
     /// Whether lists are made even if they are not needed for the sum.
     pub(crate) listed: bool,
+    /// Whether near lights are polygons.
+    pub(crate) patches: bool,
 }
 
 /// The passes that sum virtual surface lights.
@@ -156,7 +159,7 @@ impl Gather {
     }
 
     fn prepare(&mut self, gpu: &Gpu, gathering: Gathering) -> Result<(), GpuError> {
-        let Gathering { accumulation, ranged, interleave, .. } = gathering;
+        let Gathering { accumulation, ranged, interleave, patches, .. } = gathering;
         if accumulation != Accumulation::Tiled
             && !gpu.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE)
         {
@@ -168,7 +171,7 @@ impl Gather {
             });
         }
         for continues in [false, true] {
-            let variant = Variant { accumulation, ranged, continues, interleaved: interleave > 1 };
+            let variant = Variant { accumulation, ranged, continues, interleaved: interleave > 1, patches };
             self.pipelines.entry(variant).or_insert_with(|| pipeline(gpu, variant));
         }
         if interleave > 1 && self.join.is_none() {
@@ -245,6 +248,7 @@ impl Gather {
                 ranged: gathering.ranged,
                 continues: !first,
                 interleaved,
+                patches: gathering.patches,
             };
             let pipeline = &self.pipelines[&variant];
             let (to, from) = turn(targets, writes - 1 - batch);
@@ -263,6 +267,7 @@ impl Gather {
                 // Of the near lights; there is none without interleaving.
                 None,
                 lights.numbers(batch),
+                whole(&lights.patches),
             ];
             let edge = Edge { span: shading, first, last };
             match near.filter(|_| interleaved) {
@@ -296,9 +301,9 @@ impl Gather {
         gathering: Gathering,
         sees: impl Fn(Vec3, f32) -> bool,
     ) {
-        let Gathering { accumulation, ranged, .. } = gathering;
+        let Gathering { accumulation, ranged, patches, .. } = gathering;
         let pipeline =
-            &self.pipelines[&Variant { accumulation, ranged, continues: false, interleaved: false }];
+            &self.pipelines[&Variant { accumulation, ranged, continues: false, interleaved: false, patches }];
         let forward = accumulation == Accumulation::Forward;
         let batches = lights.batches();
         let span = scope.timer.span("indirect light");
@@ -306,9 +311,10 @@ impl Gather {
             let (offset, bytes) = lights.batch(batch);
             let block = part(&lights.lights, offset, bytes);
             let resources = if forward {
-                vec![whole(scope.frame), block]
+                vec![whole(scope.frame), block, lights.numbers(batch), whole(&lights.patches)]
             } else {
-                vec![whole(scope.frame), texture(&targets.gbuffer.view), block]
+                let gbuffer = texture(&targets.gbuffer.view);
+                vec![whole(scope.frame), gbuffer, block, lights.numbers(batch), whole(&lights.patches)]
             };
             let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
             let load = if batch == 0 { LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { LoadOp::Load };
@@ -339,10 +345,11 @@ fn turn(targets: &Targets, more: u32) -> (&wgpu::TextureView, &wgpu::TextureView
 
 fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
     let ranged = ("RANGED", f64::from(variant.ranged));
+    let patches = ("PATCHES", f64::from(variant.patches));
     let additive = Drawing { fragment: Some("add"), format: Some(HDR), additive: true, ..Drawing::default() };
     match variant.accumulation {
         Accumulation::Tiled => {
-            let constants = [ranged, ("CONTINUES", f64::from(variant.continues))];
+            let constants = [ranged, patches, ("CONTINUES", f64::from(variant.continues))];
             let entry = if variant.interleaved { "gather_interleaved" } else { "gather" };
             let set = Drawing {
                 vertex: "cover",
@@ -355,7 +362,7 @@ fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
             pipelines::drawing(gpu, &shader::TILED, &set)
         }
         Accumulation::Splat => {
-            let constants = [ranged];
+            let constants = [ranged, patches];
             // The far sides, once each, wherever the eye is.
             let set = Drawing {
                 vertex: "sphere",
@@ -366,7 +373,7 @@ fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
             pipelines::drawing(gpu, &shader::SPLAT, &set)
         }
         Accumulation::Forward => {
-            let constants = [ranged];
+            let constants = [ranged, patches];
             let set = Drawing {
                 vertex: "corner",
                 constants: &constants,

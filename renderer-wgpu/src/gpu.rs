@@ -181,7 +181,7 @@ fn unsuitable(
             limits.max_uniform_buffer_binding_size,
             u64::from(UNIFORM_BLOCK_BYTES),
         ),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into(), 6),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into(), 7),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup.into(), 64),
         ("max_color_attachment_bytes_per_sample", limits.max_color_attachment_bytes_per_sample.into(), 32),
     ];

@@ -13,6 +13,7 @@ pub(crate) struct Source {
 const FRAME: &str = include_str!("../wgsl/frame.wgsl");
 const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
+const VSL_PATCH: &str = include_str!("../wgsl/vsl_patch.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
 const SHADOW_NAMED: &str = include_str!("../wgsl/shadow_named.wgsl");
@@ -40,9 +41,13 @@ sources! {
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
-    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
-    SPLAT = "splat" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
-    FORWARD = "forward" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
+    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, VSL, VSL_PATCH];
+    SPLAT = "splat" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, PROJECTION, VSL, VSL_PATCH
+    ];
+    FORWARD = "forward" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, PROJECTION, VSL, VSL_PATCH
+    ];
     INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];
     AO_SMOOTH = "ao_smooth" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
@@ -53,7 +58,7 @@ sources! {
         wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_INDIRECT = "rays_indirect" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, FRAME, VSL, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL];
     PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];

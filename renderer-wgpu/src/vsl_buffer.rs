@@ -9,7 +9,7 @@ use crate::{
     scope::Scope,
     shader,
 };
-use photonstream_protocol::{VslFrame, VslRecord};
+use photonstream_protocol::{PatchRecord, VslFrame, VslRecord};
 use std::ops::Range;
 use wgpu::BufferUsages;
 
@@ -20,6 +20,8 @@ pub struct Upload {
     pub records: u64,
     /// Bytes sent.
     pub bytes: u64,
+    /// Polygons sent.
+    pub patches: u64,
     /// Whether all records were sent, because their number or the segment changed.
     pub complete: bool,
 }
@@ -32,6 +34,12 @@ pub(crate) struct VslBuffer {
     /// Lights as shaders read them, in whole batches; those beyond the last are dark.
     pub(crate) lights: wgpu::Buffer,
     refused: wgpu::Buffer,
+    /// The polygons as they were published; one without corners where there are none.
+    pub(crate) patches: wgpu::Buffer,
+    /// What it holds.
+    patch_records: Vec<PatchRecord>,
+    /// Whether the records came to the device without their polygons.
+    pub(crate) lacks_patches: bool,
     /// [`BatchNumbers`] of each batch, [`NUMBERS_STRIDE`] apart.
     numbers: wgpu::Buffer,
     /// Where changed records lie before the device puts each in its place.
@@ -47,6 +55,8 @@ pub(crate) struct VslBuffer {
 
 /// Distance between two in a buffer of uniforms: what every device takes as an offset.
 const NUMBERS_STRIDE: u64 = 256;
+/// Bytes of a polygon's record.
+const PATCH_BYTES: u64 = size_of::<PatchRecord>() as u64;
 /// Bytes of a record.
 const RECORD_BYTES: u64 = size_of::<VslRecord>() as u64;
 /// Records between two that may have changed apart.
@@ -59,6 +69,9 @@ impl VslBuffer {
             records: buffer(gpu, "records", size_of::<VslRecord>() as u64, RECORDS),
             lights: buffer(gpu, "virtual surface lights", batches_bytes(0), LIGHTS),
             refused: buffer(gpu, "records refused", 4, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            patches: buffer(gpu, "patches", PATCH_BYTES, BufferUsages::STORAGE),
+            patch_records: Vec::new(),
+            lacks_patches: false,
             numbers: buffer(gpu, "batches", NUMBERS_STRIDE, BufferUsages::UNIFORM),
             staging: None,
             pending: Vec::new(),
@@ -113,6 +126,8 @@ impl VslBuffer {
     pub(crate) fn update(&mut self, gpu: &Gpu, frame: &VslFrame) -> Result<Upload, GpuError> {
         let count = frame.vsls.len() as u32;
         self.reserve(gpu, count)?;
+        let newer_patches = self.update_patches(gpu, frame)?;
+        self.lacks_patches = false;
         let follows = self.seen.is_some_and(|(epoch, last)| epoch == frame.epoch && last <= frame.frame);
         let complete = !follows || self.count != count;
         if complete {
@@ -136,8 +151,41 @@ impl VslBuffer {
             }
             upload.records = self.send(gpu, &frame.vsls, &runs);
         }
-        upload.bytes = upload.records * RECORD_BYTES;
+        upload.bytes = upload.records * RECORD_BYTES + newer_patches * PATCH_BYTES;
+        upload.patches = newer_patches;
         Ok(upload)
+    }
+
+    /// Uploads the polygons of `frame` if any differs; how many were sent.
+    fn update_patches(&mut self, gpu: &Gpu, frame: &VslFrame) -> Result<u64, GpuError> {
+        let has_patches = frame.patches.len() == frame.vsls.len();
+        let records = if has_patches { frame.patches.as_slice() } else { &[] };
+        let seen = self.seen.filter(|(epoch, _)| *epoch == frame.epoch).map(|(_, last)| last);
+        let versions = &frame.patch_chunk_frames;
+        let is_known = self.patch_records.len() == records.len()
+            && versions.len() == records.len().div_ceil(CHUNK)
+            && seen.is_some_and(|last| versions.iter().all(|&version| version <= last));
+        if is_known || self.patch_records == records {
+            return Ok(0);
+        }
+        let bytes = records.len().max(1) as u64 * PATCH_BYTES;
+        let limits = gpu.device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes > limit {
+            let remedy = "publish fewer virtual surface lights (streaming.vsls)";
+            let what = "patches of virtual surface lights in bytes";
+            return Err(GpuError::TooLarge { what, found: bytes, limit, adapter: gpu.name(), remedy });
+        }
+        // As long as the records say, for shaders take its length for theirs.
+        if self.patches.size() != bytes.next_multiple_of(16) {
+            self.patches = buffer(gpu, "patches", bytes, BufferUsages::STORAGE);
+        }
+        let none = [PatchRecord::default()];
+        let sent = if records.is_empty() { &none } else { records };
+        gpu.queue.write_buffer(&self.patches, 0, bytemuck::cast_slice(sent));
+        self.patch_records.clear();
+        self.patch_records.extend_from_slice(records);
+        Ok(records.len() as u64)
     }
 
     /// Sends runs of records all at once, to where [`VslBuffer::flush`] takes each from: an upload costs the device's
@@ -203,7 +251,7 @@ impl VslBuffer {
         }
         gpu.queue.submit([encoder.finish()]);
         self.set_count(gpu, count);
-        (self.seen, self.mirror) = (None, None);
+        (self.seen, self.mirror, self.lacks_patches) = (None, None, true);
         Ok(())
     }
 
@@ -243,7 +291,13 @@ impl VslBuffer {
         self.flush(&mut scope.encoder);
         scope.encoder.clear_buffer(&self.refused, 0, None);
         let layout = self.unpack.get_bind_group_layout(0);
-        let resources = [whole(scope.frame), whole(&self.records), whole(&self.lights), whole(&self.refused)];
+        let resources = [
+            whole(scope.frame),
+            whole(&self.records),
+            whole(&self.lights),
+            whole(&self.refused),
+            whole(&self.patches),
+        ];
         let group = pipelines::bind(scope.gpu, &layout, &resources);
         let edge = scope.alone("unpacking");
         scope.compute(edge, &self.unpack, &[&group], groups_of_64(self.batches() * BATCH_LIGHTS));

@@ -82,14 +82,16 @@ fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
             if flux_max <= 0.0 || highest <= 4.0 * EPSILON_OF_ONE * frame.magnitude {
                 continue;
             }
+            let gap = max(lo, vec3f(0.0)) - min(hi, vec3f(0.0));
+            let nearest_sq = dot(gap, gap);
+            // A polygon may rise above a horizon below which its middle lies.
+            let is_polygon = PI * nearest_sq < -PATCH_NEAR_AREAS * light.area_term;
             // Largest n · d over the box of normals and the box of vectors to the light.
             let facing = max(max(-lo * tile.normal_lo, -lo * tile.normal_hi),
                              max(-hi * tile.normal_lo, -hi * tile.normal_hi));
-            if dot(facing, vec3f(1.0)) <= 0.0 {
+            if dot(facing, vec3f(1.0)) <= 0.0 && !is_polygon {
                 continue;
             }
-            let gap = max(lo, vec3f(0.0)) - min(hi, vec3f(0.0));
-            let nearest_sq = dot(gap, gap);
             let bound = flux_max * frame.albedo_max / (PI * PI);
             if nearest_sq > light.range_sq {
                 skipped += bound / nearest_sq * f32(tile.receivers);

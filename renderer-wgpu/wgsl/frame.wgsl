@@ -8,7 +8,7 @@ struct Frame {
     epsilon: f32,            // W m⁻² sr⁻¹; 0: no light is skipped
     albedo_max: f32,
     magnitude: f32,          // largest coordinate of the scene in m
-    area_factor: f32,        // 1 for the disc kernel, 0 for the point
+    area_factor: f32,        // 1 for the disc kernel, 0 for the point, -1 for polygons
     interleave: u32,         // edge of the pattern of interleaved sampling
     vsls: u32,
     lights: u32,

@@ -3,6 +3,7 @@
 @group(0) @binding(1) var gbuffer: texture_2d<u32>;
 @group(0) @binding(2) var<storage, read> lights: array<Vsl>;
 @group(0) @binding(3) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(4) var<storage, read> patches: array<PatchRecord>;
 
 // Sums the weights of the lights from `rays.items` to `rays.end`: what each would add if it were seen.
 @compute @workgroup_size(8, 8)
@@ -19,7 +20,7 @@ fn weigh(@builtin(global_invocation_id) id: vec3u) {
     let slot = pixel_slot(id.xy);
     var total = pixels[slot].total;
     for (var i = rays.items; i < rays.end; i++) {
-        total += weight(lights[i], transfer(lights[i], surface));
+        total += weight(lights[i], transfer(lights[i], i, surface, pixel));
     }
     pixels[slot].total = total;
 }
@@ -53,7 +54,7 @@ fn trace_indirect(@builtin(global_invocation_id) id: vec3u) {
     while state.next < rays.end && walk_turns < RAY_TURNS_FOR_NEW {
         walk_turns += 2u;
         let light = lights[state.next];
-        let reaching = transfer(light, surface);
+        let reaching = transfer(light, state.next, surface, pixel);
         if reaching > 0.0 {
             if state.suspended == 0u {
                 state.weight_a = 1.0;
@@ -80,7 +81,11 @@ fn trace_indirect(@builtin(global_invocation_id) id: vec3u) {
                     pixel_resume(state, slot);
                     state.suspended = 0u;
                 }
-                let direction = light.position + light.normal * offset - origin;
+                var target_place = light.position;
+                if vsl_is_near {
+                    target_place = origin + patch_middle;
+                }
+                let direction = target_place + light.normal * offset - origin;
                 let answer = walk(ray_frame(origin, direction, SHADOW_REACH, rays.lo, rays.hi));
                 if answer == WALK_SUSPENDED {
                     pixel_suspend(slot);
@@ -113,12 +118,12 @@ fn trace_indirect(@builtin(global_invocation_id) id: vec3u) {
 }
 
 // Share of the light's flux that arrives where nothing is between.
-fn transfer(light: Vsl, surface: Surface) -> f32 {
+fn transfer(light: Vsl, index: u32, surface: Surface, pixel: vec2u) -> f32 {
     let d = light.position - surface.position;
     if dot(d, d) > light.range_sq {
         return 0.0;
     }
-    return kernel_transfer(d, surface.normal, light.normal, light.area_term);
+    return vsl_transfer(light, index, surface.position, pixel_ray_origin(surface, pixel), surface.normal);
 }
 
 // Luminance of what would arrive.

@@ -10,6 +10,7 @@ struct Batch {
 @group(0) @binding(4) var before: texture_2d<f32>;
 @group(0) @binding(5) var before_near: texture_2d<f32>;
 @group(0) @binding(6) var<uniform> numbers: BatchNumbers;
+@group(0) @binding(7) var<storage, read> patches: array<PatchRecord>;
 
 // Whether there is irradiance of earlier batches to add to.
 override CONTINUES: bool = false;
@@ -29,7 +30,7 @@ fn gather(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let word = textureLoad(gbuffer, pixel, 0);
     if surface_is_there(word) {
         let surface = surface_unpack(word, pixel);
-        irradiance += sum_of_list(surface, first_word(pixel), 0xffffffffu);
+        irradiance += sum_of_list(surface, pixel_ray_origin(surface, pixel), first_word(pixel), 0xffffffffu);
     }
     return vec4f(irradiance, 0.0);
 }
@@ -55,7 +56,8 @@ fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
         let surface = surface_unpack(word, pixel);
         let place = interleaved_lights(pixel);
         let first = first_word(pixel);
-        far += sum_of_list(surface, first, place);
+        let origin = pixel_ray_origin(surface, pixel);
+        far += sum_of_list(surface, origin, first, place);
         let steep = steep_range(surface.distance);
         let first_near = frame.tiles.x * frame.tiles.y * BATCH_WORDS + first;
         for (var i = 0u; i < numbers.words; i++) {
@@ -65,7 +67,7 @@ fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
                 bits &= bits - 1u;
                 let light = batch.lights[i * 32u + bit];
                 // What overflows would be no number once its share is taken.
-                let added = min(vsl_irradiance(light, surface.position, surface.normal), vec3f(1e37));
+                let added = min(vsl_irradiance(light, numbers.first + i * 32u + bit, surface.position, origin, surface.normal), vec3f(1e37));
                 let share_far = smoothstep(0.5 * steep, steep, distance(light.position, surface.position));
                 near += added * (1.0 - share_far);
                 far += added * select(0.0, share_far, ((place >> bit) & 1u) == 1u);
@@ -81,14 +83,14 @@ fn first_word(pixel: vec2u) -> u32 {
 }
 
 // Irradiance of the lights of a list that are `kept`, a mask of every 32.
-fn sum_of_list(surface: Surface, first: u32, kept: u32) -> vec3f {
+fn sum_of_list(surface: Surface, origin: vec3f, first: u32, kept: u32) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < numbers.words; i++) {
         var bits = masks[first + i] & kept;
         while bits != 0u {
-            let light = batch.lights[i * 32u + firstTrailingBit(bits)];
+            let place = i * 32u + firstTrailingBit(bits);
             bits &= bits - 1u;
-            sum += vsl_irradiance(light, surface.position, surface.normal);
+            sum += vsl_irradiance(batch.lights[place], numbers.first + place, surface.position, origin, surface.normal);
         }
     }
     return sum;

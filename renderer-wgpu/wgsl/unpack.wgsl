@@ -16,6 +16,14 @@ struct Record {
 @group(0) @binding(2) var<storage, read_write> lights: array<Vsl>;
 // Number of records that were left out.
 @group(0) @binding(3) var<storage, read_write> refused: atomic<u32>;
+// Polygons of the records; fewer than records where there are none.
+@group(0) @binding(4) var<storage, read> patches: array<PatchRecord>;
+
+struct PatchRecord {
+    corners: array<f32, 24>,
+    count: u32,
+    area: f32,
+}
 
 @compute @workgroup_size(64)
 fn unpack(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
@@ -36,12 +44,31 @@ fn unpack(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gro
             && abs(dot(normal, normal) - 1.0) < 1e-4;
         if usable {
             let range_sq = kernel_range_sq(flux_max, frame.albedo_max, frame.epsilon);
-            light = Vsl(position, range_sq, normal, record.area * frame.area_factor, flux, record.object);
+            var area_term = record.area * frame.area_factor;
+            if frame.area_factor < 0.0 {
+                area_term = -patch_area(index);
+            }
+            light = Vsl(position, range_sq, normal, area_term, flux, record.object);
         } else {
             atomicAdd(&refused, 1u);
         }
     }
     lights[index] = light;
+}
+
+// Area of a record's polygon, 0 where there is none that can be used.
+fn patch_area(index: u32) -> f32 {
+    // Whatever else a record says, a polygon has at most eight corners.
+    if index >= arrayLength(&patches) || frame.vsls > arrayLength(&patches) {
+        return 0.0;
+    }
+    let count = patches[index].count;
+    let area = patches[index].area;
+    var is_usable = count >= 3u && count <= PATCH_MAX_CORNERS && is_within(vec3f(area), MAX_COORDINATE) && area > 0.0;
+    for (var i = 0u; i < 3u * PATCH_MAX_CORNERS; i++) {
+        is_usable = is_usable && is_within(vec3f(patches[index].corners[i]), MAX_COORDINATE);
+    }
+    return select(0.0, area, is_usable);
 }
 
 // Whether all components are numbers of at most this size. By bits: compilers may take any float for a number.

@@ -2,7 +2,7 @@
 
 use crate::RenderError;
 use glam::Vec3;
-use photonstream_protocol::VslRecord;
+use photonstream_protocol::{PATCH_CORNERS, PatchRecord, VslFrame, VslRecord};
 use photonstream_scene::config::MAX_LENGTH_M;
 
 /// A virtual surface light: the light that leaves one patch of a surface.
@@ -28,9 +28,63 @@ pub struct VslSet {
     flux: Vec<Vec3>,
     area: Vec<f32>,
     object: Vec<u32>,
+    /// As many as there are lights, or none.
+    patches: Vec<Patch>,
+}
+
+/// The polygon of a virtual surface light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    corners: [Vec3; PATCH_CORNERS],
+    count: usize,
+    /// Area in m², greater than 0.
+    pub area: f32,
+}
+
+impl Patch {
+    /// From the light to each corner in m, counter-clockwise as the lit side sees them.
+    pub fn corners(&self) -> &[Vec3] {
+        &self.corners[..self.count]
+    }
+
+    /// The polygon of a published record; without corners where it has none, or none that can be used.
+    fn of(record: &PatchRecord) -> Self {
+        let mut corners = [Vec3::ZERO; PATCH_CORNERS];
+        for (corner, values) in corners.iter_mut().zip(record.corners.as_chunks::<3>().0) {
+            *corner = Vec3::from_array(*values);
+        }
+        let count = record.count as usize;
+        let is_usable = (3..=PATCH_CORNERS).contains(&count)
+            && corners.iter().all(|c| c.is_finite())
+            && record.area.is_finite()
+            && record.area > 0.0;
+        Self { corners, count: if is_usable { count } else { 0 }, area: record.area }
+    }
 }
 
 impl VslSet {
+    /// The lights of a published frame with their patches.
+    ///
+    /// # Errors
+    /// As [`VslSet::from_records`].
+    pub fn from_frame(frame: &VslFrame) -> Result<Self, RenderError> {
+        Ok(Self::from_records(&frame.vsls)?.with_patches(&frame.patches))
+    }
+
+    /// The same lights with the polygons that records say; without any where there are not as many as lights.
+    pub fn with_patches(mut self, records: &[PatchRecord]) -> Self {
+        self.patches.clear();
+        if records.len() == self.len() {
+            self.patches.extend(records.iter().map(Patch::of));
+        }
+        self
+    }
+
+    /// The polygon of light `index`, where it has one.
+    pub fn patch(&self, index: usize) -> Option<&Patch> {
+        self.patches.get(index).filter(|patch| patch.count > 0)
+    }
+
     /// The lights of a published frame.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Turns a receiver and a virtual surface light into the share of its flux that arrives: the kernels K.
 
+use crate::patch::NEAR_AREAS;
 use core::f32::consts::PI;
 use glam::Vec3;
 
@@ -13,30 +14,40 @@ pub enum Kernel {
     /// Source: Wallace, Elmquist & Haines, "A Ray Tracing Algorithm for Progressive Radiosity", SIGGRAPH 1989.
     #[default]
     Disc,
+    /// The light's own polygon where π r² is below [`NEAR_AREAS`] times its area, the form factor in closed form
+    /// ([`crate::patch`]); a point beyond.
+    Patch,
 }
 
 impl Kernel {
     /// All kernels, in the order of their discriminants.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Disc];
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Disc, Self::Patch];
 
     /// The name used in configs and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
             Self::Disc => "disc",
+            Self::Patch => "patch",
         }
     }
 
-    /// What is added to π r² in the denominator for a light of `area` m².
+    /// What is added to π r² in the denominator for a light of `area` m²; with [`Kernel::Patch`] where it is far.
     #[inline]
     pub fn area_term(self, area: f32) -> f32 {
         match self {
-            Self::Paper => 0.0,
+            Self::Paper | Self::Patch => 0.0,
             Self::Disc => area,
         }
     }
 
-    /// cos θ cos θ_s K in m⁻²: times Φ_s and V, the irradiance that the light adds at the receiver.
+    /// Whether a receiver at a squared distance of `r_sq` m² sees the polygon, of `area` m², instead of a point.
+    #[inline]
+    pub fn is_near(self, r_sq: f32, area: f32) -> bool {
+        self == Self::Patch && PI * r_sq < NEAR_AREAS * area
+    }
+
+    /// cos θ cos θ_s K in m⁻², with [`Kernel::Patch`] that of a far light: times Φ_s and V, the irradiance that the light adds at the receiver.
     ///
     /// `d` leads from receiver to light (m, not normalised), `n` and `n_s` are their unit normals, `area` is the
     /// light's in m². Zero where either faces away and where the two coincide.

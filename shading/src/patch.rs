@@ -11,7 +11,7 @@ use glam::Vec3;
 pub const MAX_CORNERS: usize = 8;
 
 /// Where π r² is below so many times its area, a light is the polygon of its patch; beyond it is a point.
-pub const NEAR_AREAS: f32 = 16.0;
+pub const NEAR_AREAS: f32 = 32.0;
 
 /// Form factor of a patch for a receiver of normal `n`: irradiance at the receiver over the patch's radiosity, in [0, 1].
 ///
@@ -69,15 +69,15 @@ pub fn angle(sine: f32, cosine: f32) -> f32 {
     let magnitude = cosine.abs();
     let ratio = sine.min(magnitude) / sine.max(magnitude);
     let s = ratio * ratio;
-    let mut p = 0.002_866_225_7;
+    let mut p = 0.002_866_225_8;
     for c in [
         -0.016_165_737,
         0.042_909_61,
         -0.075_289_64,
         0.106_562_64,
-        -0.142_088_99,
+        -0.142_089,
         0.199_935_51,
-        -0.333_331_45,
+        -0.333_331_44,
         1.0,
     ] {
         p = p * s + c;

@@ -53,11 +53,11 @@ fn patch_form_factor(count: u32, n: vec3f) -> f32 {
     return clamp(-factor / (2.0 * PI), 0.0, 1.0);
 }
 
-fn patch_edge(from: vec3f, to: vec3f, n: vec3f) -> f32 {
-    let across = cross(from, to);
+fn patch_edge(start: vec3f, end: vec3f, n: vec3f) -> f32 {
+    let across = cross(start, end);
     let sine = length(across);
     if sine > 0.0 {
-        return dot(n, across) * (patch_angle(sine, dot(from, to)) / sine);
+        return dot(n, across) * (patch_angle(sine, dot(start, end)) / sine);
     }
     return 0.0;
 }
@@ -67,14 +67,14 @@ fn patch_angle(sine: f32, cosine: f32) -> f32 {
     let magnitude = abs(cosine);
     let ratio = min(sine, magnitude) / max(sine, magnitude);
     let s = ratio * ratio;
-    var p = 0.0028662257f;
+    var p = 0.0028662258f;
     p = p * s - 0.016165737f;
     p = p * s + 0.04290961f;
     p = p * s - 0.07528964f;
     p = p * s + 0.10656264f;
-    p = p * s - 0.14208899f;
+    p = p * s - 0.142089f;
     p = p * s + 0.19993551f;
-    p = p * s - 0.33333145f;
+    p = p * s - 0.33333144f;
     p = p * s + 1.0f;
     var a = ratio * p;
     if sine > magnitude {

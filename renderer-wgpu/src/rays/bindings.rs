@@ -48,7 +48,7 @@ impl Layouts {
         let dispatch = buffer(BufferBindingType::Uniform, true);
         Self {
             inputs: [
-                layout(&[(0, frame), (1, gbuffer), (2, read()), (3, output)]),
+                layout(&[(0, frame), (1, gbuffer), (2, read()), (3, output), (4, read())]),
                 layout(&[(0, frame), (4, write())]),
             ],
             tracing: layout(&[

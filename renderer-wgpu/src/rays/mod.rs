@@ -109,6 +109,8 @@ pub(crate) struct RayInputs<'a> {
     pub(crate) size: [u32; 2],
     /// `Light` records for direct light, `Vsl` records for indirect light.
     pub(crate) lights: &'a wgpu::Buffer,
+    /// Polygons of the virtual surface lights; whatever there is for direct light.
+    pub(crate) patches: &'a wgpu::Buffer,
     /// Number of lights, as in the uniforms.
     pub(crate) count: u32,
     /// Number of the camera sample, from 0: each has other samples of lights.
@@ -276,12 +278,13 @@ impl Rays {
         bind(
             gpu,
             &self.layouts.inputs[0],
-            &[0, 1, 2, 3],
+            &[0, 1, 2, 3, 4],
             [
                 inputs.frame.as_entire_binding(),
                 wgpu::BindingResource::TextureView(inputs.gbuffer),
                 inputs.lights.as_entire_binding(),
                 wgpu::BindingResource::TextureView(inputs.output),
+                inputs.patches.as_entire_binding(),
             ],
         )
     }

@@ -144,11 +144,13 @@ impl Picture {
     ) -> (Vec<Vec3>, Traced) {
         self.gpu.queue.write_buffer(&self.frame_buffer, 0, bytemuck::bytes_of(&self.frame));
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let patches = upload(&self.gpu, "no patches", &[0; size_of::<photonstream_protocol::PatchRecord>()]);
         let inputs = RayInputs {
             frame: &self.frame_buffer,
             gbuffer: &self.gbuffer.view,
             size: self.frame.size,
             lights,
+            patches: &patches,
             count,
             sample,
             output: &self.output.view,

@@ -57,22 +57,24 @@ fn every_layer_kernel_and_light_is_the_cpus() {
     }
 }
 
-/// Indirect light with a shadow ray to every light, against the CPU's: relative RMSE ≤ 1e-3.
+/// Indirect light with a shadow ray to every light, against the CPU's, every kernel: relative RMSE ≤ 1e-3.
 /// 40 × 30 pixels, 60 lights.
 #[test]
 fn rays_to_every_light_are_the_cpus() {
     let lit = scenes::cornell(LAMPS[0].1, "vsls = 60\npool_paths = 4096");
     let Some(mut renderer) = lit.renderer() else { return };
-    let view = View { visibility: Visibility::Rays, rays_per_pixel: 0, ..lit.view(40, 30) };
-    let layers = [LayerKind::Indirect, LayerKind::Normal, LayerKind::Albedo];
-    let expected = lit.on_cpu(&view, &layers);
-    let found = layers.map(|l| layer(&mut renderer, &view, l));
-    let same = same_surface([&found[1], &expected[1]], [&found[2], &expected[2]]);
-    let error = rel_rmse(&found[0], &expected[0], |i| same[i]);
-    assert!(error <= 1e-3, "{error:e}");
-    // Without shadows it is another picture: the test can fail.
-    let open = layer(&mut renderer, &View { visibility: Visibility::None, ..view }, LayerKind::Indirect);
-    assert!(rel_rmse(&open, &expected[0], |i| same[i]) > 0.01);
+    for kernel in Kernel::ALL {
+        let view = View { kernel, visibility: Visibility::Rays, rays_per_pixel: 0, ..lit.view(40, 30) };
+        let layers = [LayerKind::Indirect, LayerKind::Normal, LayerKind::Albedo];
+        let expected = lit.on_cpu(&view, &layers);
+        let found = layers.map(|l| layer(&mut renderer, &view, l));
+        let same = same_surface([&found[1], &expected[1]], [&found[2], &expected[2]]);
+        let error = rel_rmse(&found[0], &expected[0], |i| same[i]);
+        assert!(error <= 1e-3, "{kernel}: {error:e}");
+        // Without shadows it is another picture: the test can fail.
+        let open = layer(&mut renderer, &View { visibility: Visibility::None, ..view }, LayerKind::Indirect);
+        assert!(rel_rmse(&open, &expected[0], |i| same[i]) > 0.01);
+    }
 }
 
 /// Pixels at which GPU and CPU see the same surface.

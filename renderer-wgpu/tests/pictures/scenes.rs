@@ -60,8 +60,10 @@ pub(crate) fn lit(text: &str) -> Lit {
     for record in &mut vsls {
         record.changed_frame = 1;
     }
-    let frame = VslFrame { epoch: 1, frame: 1, vsls, scene_hash: scene.hash, ..VslFrame::default() };
+    let patches = records::patch_records(&scene, &simulation.placement);
     drop(simulation);
+    let scene_hash = scene.hash;
+    let frame = VslFrame { epoch: 1, frame: 1, vsls, patches, scene_hash, ..VslFrame::default() };
     Lit { scene: Arc::unwrap_or_clone(scene), frame }
 }
 
@@ -97,7 +99,7 @@ impl Lit {
             layers: layers.to_vec(),
             ..RenderOptions::from_settings(&self.scene.render)
         };
-        let vsls = VslSet::from_records(&self.frame.vsls).unwrap();
+        let vsls = VslSet::from_frame(&self.frame).unwrap();
         let film =
             photonstream_renderer_cpu::render(&self.scene, &vsls, &options, Watch::default()).unwrap().film;
         film.layers().iter().map(|l| l.pixels.clone()).collect()

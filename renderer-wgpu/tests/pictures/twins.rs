@@ -352,3 +352,35 @@ fn literal(shape: &LightShape) -> String {
         offset
     )
 }
+
+/// Quadrilaterals before, across and below a receiver's horizon, from a thousandth of their size away to ten sizes. The sum over
+/// edges cancels in thin slices of light: against 0.01.
+#[test]
+fn patch() {
+    let inputs: Vec<_> = uniform()
+        .iter()
+        .map(|x| {
+            let mut y = [0.0; 16];
+            let normal = direction(x, 0);
+            let (u, v) = photonstream_shading::basis::tangents(normal);
+            // Counter-clockwise as the lit side sees them, around a place before which the receiver lies.
+            let away = direction(x, 2) * (10f32).powf(4.0 * x[4] - 3.0);
+            let centre = away - normal * (normal.dot(away) + 0.001 + away.length());
+            for (k, (a, b)) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].into_iter().enumerate() {
+                let corner = centre + u * a * (0.5 + x[5]) + v * b * (0.5 + x[6]);
+                y[3 * k..3 * k + 3].copy_from_slice(&corner.to_array());
+            }
+            y[12..15].copy_from_slice(&direction(x, 7).to_array());
+            y
+        })
+        .collect();
+    let body = "for (var i = 0u; i < 4u; i++) {
+            patch_corners[i] = vec3f(x[3u * i], x[3u * i + 1u], x[3u * i + 2u]);
+        }
+        y[0] = patch_form_factor(4u, vec3f(x[12], x[13], x[14]));";
+    check("patch_form_factor", &[wgsl::PATCH], body, 0.01, &inputs, |x| {
+        let corners = [0, 3, 6, 9].map(|at| vector(x, at));
+        let mut middle = Vec3::ZERO;
+        [photonstream_shading::patch::form_factor(&corners, vector(x, 12), &mut middle), 0.0, 0.0, 0.0]
+    });
+}
