@@ -20,7 +20,7 @@ pub(crate) struct Look {
     /// Size in pixels [default: as the scene says]
     #[arg(long, value_name = "WxH")]
     pub(crate) size: Option<Size>,
-    /// How a light's flux falls off: `disc` (bounded) or `paper` (1/πr²) [default: as the scene says]
+    /// How a light's flux falls off: `patch` (near ones as polygons), `disc` (bounded) or `paper` (1/πr²) [default: as the scene says]
     #[arg(long)]
     pub(crate) kernel: Option<Kernel>,
     /// Shadows of indirect light: `rays`, `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]

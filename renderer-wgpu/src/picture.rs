@@ -198,7 +198,8 @@ impl FrameRenderer for WgpuRenderer {
             }
             film.push(layer.name(), pixels)?;
         }
-        stats.range_loss_share = if stats.range_loss_share > 0.0 { stats.range_loss_share / indirect_sum } else { 0.0 };
+        stats.range_loss_share =
+            if stats.range_loss_share > 0.0 { stats.range_loss_share / indirect_sum } else { 0.0 };
         self.warn()?;
         let by_rays = options.needs(LayerKind::needs_indirect) && options.visibility == Visibility::Rays;
         stats.noise = if by_rays { self.renderer.noise()? } else { None };

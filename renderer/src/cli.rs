@@ -27,7 +27,7 @@ pub struct Args {
     /// Picture size in pixels, such as 800x600; the scene's own if not given.
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// How light falls off: paper or disc; the scene's own if not given.
+    /// How light falls off: paper, disc or patch; the scene's own if not given.
     #[arg(long, value_name = "K")]
     pub kernel: Option<Kernel>,
     /// Shadows of indirect light: none, rays, or ao with the GPU renderer; the scene's own if not given.
@@ -118,7 +118,7 @@ mod tests {
         for (line, expected) in [
             ("r --size 800", "such as 800x600"),
             ("r --size 0x5", "such as 800x600"),
-            ("r --kernel box", "paper, disc"),
+            ("r --kernel box", "paper, disc, patch"),
             ("r --show ful", "full, direct, indirect"),
             ("r --frames 0", "0 is not in 1.."),
             ("r --first 0", "0 is not in 1.."),

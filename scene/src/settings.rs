@@ -110,7 +110,7 @@ impl Default for RenderSettings {
         Self {
             width: 800,
             height: 600,
-            kernel: Kernel::Disc,
+            kernel: Kernel::Patch,
             visibility: Visibility::Rays,
             epsilon: 1e-6,
             light_samples: 16,

@@ -12,10 +12,10 @@ pub enum Kernel {
     /// K = 1/(π r² + A): a disc of area A seen on its axis; bounded by 1/A, too dark beside an edge.
     ///
     /// Source: Wallace, Elmquist & Haines, "A Ray Tracing Algorithm for Progressive Radiosity", SIGGRAPH 1989.
-    #[default]
     Disc,
     /// The light's own polygon where π r² is below [`NEAR_AREAS`] times its area, the form factor in closed form
     /// ([`crate::patch`]); a point beyond.
+    #[default]
     Patch,
 }
 

@@ -80,7 +80,8 @@ pub(crate) fn tasks(simulation: &Simulation) -> u64 {
 pub(crate) fn vsls_of(simulation: &Simulation, ledger: &Ledger) -> Result<VslSet, EvaluateError> {
     let mut vsls = records::vsl_records(&simulation.scene, &simulation.placement);
     records::write_flux(&mut vsls, ledger.readings(&simulation.scene), 0);
-    Ok(VslSet::from_records(&vsls)?)
+    let patches = records::patch_records(&simulation.scene, &simulation.placement);
+    Ok(VslSet::from_records(&vsls)?.with_patches(&patches))
 }
 
 /// A picture of the light of `simulation`, its pool filled.

@@ -3,7 +3,7 @@
 use crate::harness::{Ground, config, wait_for};
 use photonstream_film::Film;
 
-/// 131 072 paths, seed 1, 1 000 lights, kernel `disc`, shadow rays; 48 × 48 pixels against 512 paths a pixel, seed 1, whose own noise is 0.05.
+/// 131 072 paths, seed 1, 1 000 lights, kernel `patch`, shadow rays; 48 × 48 pixels against 512 paths a pixel, seed 1, whose own noise is 0.05.
 #[test]
 fn separate_processes_make_the_right_picture() {
     let ground = Ground::new();
@@ -24,7 +24,7 @@ fn separate_processes_make_the_right_picture() {
     assert_eq!(format!("{:016x}", metadata.scene_hash.unwrap()), check["scene_hash"]);
     assert_eq!(metadata.scene_name.as_deref(), Some("Cornell box"));
     assert_eq!(metadata.method.as_deref(), Some("photon-streaming"));
-    assert_eq!(metadata.kernel.as_deref(), Some("disc"));
+    assert_eq!(metadata.kernel.as_deref(), Some("patch"));
     assert_eq!(metadata.visibility.as_deref(), Some("rays"));
     assert_eq!(metadata.photon_paths, Some(131_072));
     assert_eq!(metadata.vsls, Some(1000));
