@@ -108,10 +108,10 @@ fn every_flipped_header_bit_is_refused() {
 #[test]
 fn foreign_segments_are_told_apart() {
     let victim = Victim::new();
-    victim.write_header(&[(1, 3)]);
+    victim.write_header(&[(1, 4)]);
     assert!(matches!(
         victim.attach(AccessMode::Mapped),
-        Err(ProtocolError::VersionMismatch { found_major: 3, expected: 2, .. })
+        Err(ProtocolError::VersionMismatch { found_major: 4, expected: 3, .. })
     ));
     victim.write_header(&[(2, 9)]);
     victim.attach(AccessMode::Mapped).unwrap();

@@ -67,7 +67,7 @@ fn layers_hold_what_they_say() {
     colours.dedup();
     assert!(colours.len() > 3 && colours.len() <= 10, "{} owners", colours.len());
     assert_eq!(film.metadata.scene_hash, Some(scene.hash));
-    assert_eq!(film.metadata.kernel.as_deref(), Some("patch"));
+    assert_eq!(film.metadata.kernel.as_deref(), Some("disc"));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::scenes::{self, LAMPS, Lit, layer};
 use photonstream_protocol::VslRecord;
 use photonstream_renderer::LayerKind;
 use photonstream_renderer_wgpu::{Accumulation, GpuError, Renderer, Show, View};
+use photonstream_shading::Kernel;
 
 fn room(vsls: u32) -> Lit {
     scenes::cornell(LAMPS[1].1, &format!("vsls = {vsls}\npool_paths = 4096"))
@@ -61,12 +62,13 @@ fn impossible_records_never_reach_a_pixel() {
     assert!(blinding.iter().all(|p| p.is_finite()) && blinding.iter().any(|p| p.x > 1e20));
 }
 
-/// No light at all is black, one light lights, 100 000 are as bright as 500 of the same sum. 32 × 32 pixels.
+/// No light at all is black, one light lights, 100 000 are as bright as 500 of the same sum. 32 × 32 pixels. Kernel `disc`: these
+/// lights come without patches.
 #[test]
 fn no_light_one_light_and_a_hundred_thousand() {
     let lit = room(500);
     let Some(mut renderer) = lit.renderer() else { return };
-    let view = lit.view(32, 32);
+    let view = View { kernel: Kernel::Disc, ..lit.view(32, 32) };
     let indirect = layer(&mut renderer, &view, LayerKind::Indirect);
     let mut frame = lit.frame.clone();
     let mut show = |renderer: &mut Renderer, vsls: Vec<VslRecord>, view: &View| {

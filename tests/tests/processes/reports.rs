@@ -81,7 +81,7 @@ fn json_reports_have_their_documented_keys() {
     has_keys(
         &compare,
         &keys(
-            "picture reference layer rel_rmse rel_mse bias worst_1pct mean_a mean_b red green blue \
+            "picture reference layer rel_rmse rel_mse bias worst_1pct flip maps mean_a mean_b red green blue \
              reference_noise_rel_rmse at_noise_floor",
         ),
     );
