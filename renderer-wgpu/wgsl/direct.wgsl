@@ -56,7 +56,7 @@ fn arrive(@builtin(position) at: vec4f) -> @location(0) vec4f {
 
 // Irradiance through one point of a light.
 fn arriving(light: Light, surface: Surface, origin: vec3f, u: vec2f, first_map: u32) -> vec3f {
-    let reached = light_illuminate(light, origin, u);
+    let reached = light_illuminate(light, surface.position, u);
     let cos_theta = dot(surface.normal, reached.wi);
     if cos_theta <= 0.0 || reached.irradiance <= 0.0 {
         return vec3f(0.0);
@@ -72,7 +72,8 @@ fn arriving(light: Light, surface: Surface, origin: vec3f, u: vec2f, first_map: 
             map += half_cube_face(vec3f(dot(across, -reached.wi), dot(along, -reached.wi), dot(light.direction, -reached.wi)));
         }
         if NAMED_MAPS && light.kind < LIGHT_PARALLELOGRAM {
-            let is_free = shadow_free(map, origin, reached.wi, reached.distance * SHADOW_REACH);
+            let way = way_to_light(surface, origin, reached.wi, reached.distance);
+            let is_free = shadow_free(map, origin, way, select(SHADOW_REACH, F32_MAX, reached.distance >= F32_MAX));
             lit = select(0.0, 1.0, is_free);
         } else if AREA_LIGHTS || !NAMED_MAPS {
             lit = shadow_lit(map, surface.position, surface.normal, cos_theta);

@@ -74,6 +74,15 @@ fn pixel_ray_origin(surface: Surface, pixel: vec2u) -> vec3f {
     return surface_ray_origin(surface) - pixel_ray(pixel) * (frame.magnitude * RELATIVE_OFFSET);
 }
 
+// The way from where rays leave to a light's point at `distance` along `wi` from the surface itself: a lamp may be nearer than
+// a few times the way between. In units of its own length, which is 1 for a light infinitely far away.
+fn way_to_light(surface: Surface, origin: vec3f, wi: vec3f, distance: f32) -> vec3f {
+    if distance >= F32_MAX {
+        return wi;
+    }
+    return wi * distance - (origin - surface.position);
+}
+
 // Whether the visible side of the surface reflects light.
 fn object_reflects(object: Object, front: bool) -> bool {
     return (object.sides & select(2u, 1u, front)) != 0u;

@@ -93,9 +93,11 @@ fn trace_direct(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn ask(light: Light, surface: Surface, origin: vec3f, u: vec2f) -> Question {
-    let reached = light_illuminate(light, origin, u);
+    let reached = light_illuminate(light, surface.position, u);
     let cos_theta = dot(surface.normal, reached.wi);
     let arriving = light.power * (reached.irradiance * cos_theta);
     let asked = cos_theta > 0.0 && reached.irradiance > 0.0 && any(light.power != vec3f(0.0));
-    return Question(reached.wi, reached.distance * SHADOW_REACH, arriving, asked);
+    let way = way_to_light(surface, origin, reached.wi, reached.distance);
+    let t_max = select(SHADOW_REACH, F32_MAX, reached.distance >= F32_MAX);
+    return Question(way, t_max, arriving, asked);
 }

@@ -12,7 +12,7 @@ fn map_corner(index: u32) -> vec3f {
     return vec3f(place[0], place[1], place[2]);
 }
 
-// Whether the way from `origin` along `wi` is free for `reach`.
+// Whether the way from `origin` along `wi` is free for `reach` times its length.
 //
 // The 4 × 4 texels around the place name what the light sees there, and the ray itself is tested against each of these
 // triangles: a shadow's edge is as sharp and as exact as the triangles, and nothing leaks where surfaces meet. Triangles

@@ -94,7 +94,7 @@ fn a_window_shows_what_is_published_and_follows_the_hands_of_its_user() {
 
     // Keys move the camera; without the overlay, which covers most of so small a window.
     window.key("Tab");
-    window.hold_key("w", 300);
+    window.hold_key("w", 5);
     window.rest(&mut simulator);
     let nearer = compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
     assert!(nearer.camera.position.z < home.camera.position.z - 0.01, "{:?}", nearer.camera);

@@ -113,10 +113,12 @@ impl<'a> Window<'a> {
         self.display.hands(&["key", key]);
     }
 
-    pub(crate) fn hold_key(&mut self, key: &str, milliseconds: u64) {
+    /// Holds a key down until so many pictures were shown meanwhile, however long each takes.
+    pub(crate) fn hold_key(&mut self, key: &str, pictures: usize) {
         self.id();
+        let before = self.presented();
         self.display.hands(&["keydown", key]);
-        std::thread::sleep(Duration::from_millis(milliseconds));
+        self.wait("pictures while a key is held", |window| window.presented() >= before + pictures);
         self.display.hands(&["keyup", key]);
     }
 
