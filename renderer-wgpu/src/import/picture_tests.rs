@@ -9,6 +9,7 @@ use crate::{Renderer, Show, View};
 use photonstream_protocol::{AccessMode, Reading};
 use photonstream_renderer::LayerKind;
 use photonstream_scene::{SceneConfig, Visibility};
+use photonstream_shading::Kernel;
 use photonstream_simulator::{records, simulation::Simulation};
 use std::{path::Path, sync::Arc};
 
@@ -37,6 +38,7 @@ fn imported_lights_make_the_picture_of_uploaded_ones() {
         width: 40,
         height: 40,
         visibility: Visibility::None,
+        kernel: Kernel::Disc,
         ..View::from_settings(&scene.render, &scene.camera)
     };
     let shows = [Show::Layer(LayerKind::Full), Show::Layer(LayerKind::Flux), Show::Discs];
@@ -47,6 +49,9 @@ fn imported_lights_make_the_picture_of_uploaded_ones() {
         })
     };
     renderer.set_imported(&imported).unwrap();
+    // Polygons do not come with a segment: that is told, not drawn as something else.
+    let refused = renderer.draw(&View { kernel: Kernel::Patch, ..view }).unwrap_err().to_string();
+    assert!(refused.contains("kernel patch"), "{refused}");
     let found = draw(&mut renderer);
     assert!(renderer.set_frame(frame).unwrap().complete);
     assert!(found == draw(&mut renderer));
