@@ -5,9 +5,12 @@
 //! shows it all. [`compare`] is for two pictures.
 #![forbid(unsafe_code)]
 
+mod command;
+pub mod device;
 mod error;
 mod evaluate;
 pub mod flip;
+pub mod hard_cases;
 pub mod machine;
 pub mod maps;
 pub mod methods;

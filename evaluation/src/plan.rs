@@ -1,6 +1,9 @@
 //! Turns a scene into the points to measure: sweeps of one setting each, and the methods to compare with.
 
-use crate::point::{Method, Point};
+use crate::{
+    device::Way,
+    point::{Method, Point},
+};
 use photonstream_scene::{Sampling, Visibility};
 use photonstream_shading::Kernel;
 
@@ -90,12 +93,16 @@ pub const SHADING: &str = "kernel-visibility";
 pub const SAMPLING: &str = "sampling";
 /// The sweep of threads.
 pub const THREADS: &str = "threads";
+/// The sweep of the ways in which a graphics device sums lights, and of its shadows.
+pub const ACCUMULATION: &str = "accumulation";
+/// Lights and pools that grow together, drawn by a graphics device.
+pub const GPU: &str = "gpu";
 /// The scene as its config says.
 pub const CONFIG: &str = "config";
 
 /// All points of a scene but those of path tracing, which go on until the time is over. `base` is the scene as its config
-/// says; equal points are measured once.
-pub fn plan(base: &Point, effort: Effort) -> Vec<Planned> {
+/// says; equal points are measured once. `ways` are those of the graphics device, its default first; none without a device.
+pub fn plan(base: &Point, effort: Effort, ways: &[Way]) -> Vec<Planned> {
     let mut planned: Vec<Planned> = Vec::new();
     let mut add = |sweep: &str, point: Point| {
         let text = point.to_string();
@@ -139,7 +146,26 @@ pub fn plan(base: &Point, effort: Effort) -> Vec<Planned> {
     for &vsls in effort.vsls() {
         add(TIME, Point { method: Method::PaperA, vsls, ..base.clone() });
     }
+    // Shadow rays go to all lights in one loop: the ways are compared without.
+    for way in ways {
+        add(ACCUMULATION, on_device(base, way, Visibility::None));
+    }
+    if let Some(way) = ways.first() {
+        for &visibility in Visibility::ALL {
+            add(ACCUMULATION, on_device(base, way, visibility));
+        }
+        for visibility in [Visibility::None, base.visibility] {
+            for &(vsls, pool) in effort.pairs() {
+                add(GPU, Point { vsls, pool, ..on_device(base, way, visibility) });
+            }
+        }
+    }
     planned
+}
+
+fn on_device(base: &Point, way: &Way, visibility: Visibility) -> Point {
+    let Way { accumulation, interleave } = way.clone();
+    Point { method: Method::PhotonStreamingGpu, accumulation, interleave, visibility, ..base.clone() }
 }
 
 #[cfg(test)]
@@ -155,6 +181,8 @@ mod tests {
             visibility: Visibility::Rays,
             sampling: Sampling::Replay,
             light_samples: 16,
+            accumulation: "tiled".into(),
+            interleave: 1,
             spp: 64,
             threads: 2,
             seed: 1,
@@ -163,7 +191,9 @@ mod tests {
 
     #[test]
     fn every_kernel_visibility_and_method_is_there_once() {
-        let planned = plan(&base(), Effort::Default);
+        let way = |accumulation: &str, interleave| Way { accumulation: accumulation.into(), interleave };
+        let ways = [way("tiled", 1), way("tiled", 4), way("splat", 1)];
+        let planned = plan(&base(), Effort::Default, &ways);
         let texts: Vec<String> = planned.iter().map(|p| p.point.to_string()).collect();
         for (i, text) in texts.iter().enumerate() {
             assert!(!texts[..i].contains(text), "{text} is measured twice");
@@ -172,6 +202,15 @@ mod tests {
         assert!(Kernel::ALL.iter().all(|&k| has(&|p| p.kernel == k)));
         assert!(Visibility::ALL.iter().all(|&v| has(&|p| p.visibility == v)));
         assert!(Method::ALL.iter().filter(|&&m| m != Method::PathTracing).all(|&m| has(&|p| p.method == m)));
+        let drawn = |way: &Way| {
+            has(&|p| {
+                p.method == Method::PhotonStreamingGpu
+                    && (p.accumulation.as_str(), p.interleave) == (way.accumulation.as_str(), way.interleave)
+            })
+        };
+        assert!(ways.iter().all(drawn));
+        let without = plan(&base(), Effort::Default, &[]);
+        assert!(without.iter().all(|p| p.point.method != Method::PhotonStreamingGpu));
         // The config's own point is in every sweep of one setting.
         let own = &planned[0];
         assert_eq!(own.point, base());

@@ -9,6 +9,8 @@ use std::{fmt, str::FromStr};
 pub enum Method {
     /// This project: photons streamed onto virtual surface lights.
     PhotonStreaming,
+    /// The same light, its picture drawn by a graphics device.
+    PhotonStreamingGpu,
     /// Paths from the camera, until the time is over; the reference's own code.
     PathTracing,
     /// Random virtual point lights with shadow rays. Source: Keller, "Instant Radiosity", SIGGRAPH 1997.
@@ -21,8 +23,9 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::PhotonStreaming,
+        Self::PhotonStreamingGpu,
         Self::PathTracing,
         Self::InstantRadiosity,
         Self::InstantRadiosityBounded,
@@ -33,6 +36,7 @@ impl Method {
     pub const fn name(self) -> &'static str {
         match self {
             Self::PhotonStreaming => "photon-streaming",
+            Self::PhotonStreamingGpu => "photon-streaming-gpu",
             Self::PathTracing => "path-tracing",
             Self::InstantRadiosity => "instant-radiosity",
             Self::InstantRadiosityBounded => "instant-radiosity-bounded",
@@ -45,6 +49,18 @@ impl Method {
             Self::PhotonStreaming => {
                 &["vsls", "pool", "kernel", "visibility", "sampling", "light_samples", "threads", "seed"]
             }
+            Self::PhotonStreamingGpu => &[
+                "vsls",
+                "pool",
+                "kernel",
+                "visibility",
+                "sampling",
+                "light_samples",
+                "accumulation",
+                "interleave",
+                "threads",
+                "seed",
+            ],
             Self::PathTracing => &["spp", "threads", "seed"],
             Self::InstantRadiosity | Self::InstantRadiosityBounded => {
                 &["vsls", "visibility", "light_samples", "threads", "seed"]
@@ -88,6 +104,10 @@ pub struct Point {
     pub sampling: Sampling,
     /// Shadow rays per pixel and area light.
     pub light_samples: u32,
+    /// How a graphics device sums lights; its own word for it.
+    pub accumulation: String,
+    /// Edge of the device's pattern of interleaved sampling.
+    pub interleave: u32,
     /// Paths per pixel.
     pub spp: u64,
     /// Threads.
@@ -108,6 +128,8 @@ impl Point {
             visibility,
             sampling: scene.streaming.sampling,
             light_samples,
+            accumulation: "tiled".into(),
+            interleave: 1,
             spp: 64,
             threads,
             seed: scene.streaming.seed,
@@ -157,6 +179,8 @@ impl Point {
             "visibility" => self.visibility = value.parse()?,
             "sampling" => self.sampling = value.parse()?,
             "light_samples" => self.light_samples = number(key, value, 1)?,
+            "accumulation" => self.accumulation = value.to_owned(),
+            "interleave" => self.interleave = number(key, value, 1)?,
             "spp" => self.spp = number(key, value, 1)?,
             "threads" => self.threads = number::<u32>(key, value, 1)? as usize,
             _ => self.seed = number(key, value, 0)?,
@@ -178,6 +202,8 @@ impl fmt::Display for Point {
                 "visibility" => f.write_str(self.visibility.name())?,
                 "sampling" => f.write_str(self.sampling.name())?,
                 "light_samples" => write!(f, "{}", self.light_samples)?,
+                "accumulation" => f.write_str(&self.accumulation)?,
+                "interleave" => write!(f, "{}", self.interleave)?,
                 "spp" => write!(f, "{}", self.spp)?,
                 "threads" => write!(f, "{}", self.threads)?,
                 _ => write!(f, "{}", self.seed)?,
@@ -201,6 +227,8 @@ mod tests {
             visibility: Visibility::Rays,
             sampling: Sampling::Replay,
             light_samples: 16,
+            accumulation: "splat".into(),
+            interleave: 2,
             spp: 64,
             threads: 2,
             seed: 1,

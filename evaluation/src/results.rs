@@ -1,6 +1,6 @@
 //! Turns measurements into rows of a table, and rows into CSV and JSON.
 
-use crate::{EvaluateError, machine::Machine};
+use crate::{EvaluateError, hard_cases::Checked, machine::Machine};
 use photonstream_simulator::bench::EventFigures;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -42,6 +42,12 @@ pub struct Row {
     pub sampling: Option<String>,
     /// Shadow rays per pixel and area light.
     pub light_samples: Option<u32>,
+    /// How a graphics device sums lights.
+    pub accumulation: Option<String>,
+    /// Edge of its pattern of interleaved sampling.
+    pub interleave: Option<u32>,
+    /// The graphics device.
+    pub adapter: Option<String>,
     /// Paths per pixel.
     pub spp: Option<u64>,
     /// Width of the picture.
@@ -145,6 +151,10 @@ pub struct Results {
     pub machine: Machine,
     /// Whether everything that was asked for is in it.
     pub complete: bool,
+    /// What measures all of it again.
+    pub command: String,
+    /// The graphics device, if there is one.
+    pub adapter: Option<String>,
     /// Seconds it took.
     pub seconds: f64,
     /// All points of all scenes.
@@ -153,20 +163,25 @@ pub struct Results {
     pub splits: Vec<Split>,
     /// How fast light follows changes.
     pub changes: Vec<StepChange>,
+    /// Hard cases that were run here.
+    pub hard_cases: Vec<Checked>,
     /// What was left out.
     pub skipped: Vec<Skipped>,
 }
 
 impl Results {
-    /// Nothing yet.
-    pub fn new(machine: Machine) -> Self {
+    /// Nothing yet; `command` is what measures it.
+    pub fn new(machine: Machine, command: String) -> Self {
         Self {
             machine,
             complete: false,
+            command,
+            adapter: None,
             seconds: 0.0,
             rows: Vec::new(),
             splits: Vec::new(),
             changes: Vec::new(),
+            hard_cases: Vec::new(),
             skipped: Vec::new(),
         }
     }
@@ -219,6 +234,9 @@ pub(crate) mod tests {
             visibility: Some("rays".into()),
             sampling: None,
             light_samples: Some(16),
+            accumulation: None,
+            interleave: None,
+            adapter: None,
             spp: None,
             width_px: 8,
             height_px: 6,
@@ -245,7 +263,7 @@ pub(crate) mod tests {
     #[test]
     fn csv_and_json_have_the_same_rows() {
         let folder = tempfile::tempdir().unwrap();
-        let mut results = Results::new(Machine::here());
+        let mut results = Results::new(Machine::here(), "photonstream evaluate a.toml".into());
         results.rows = vec![row("photon-streaming", 12.5, 0.1), row("path-tracing", 1e4, 0.375)];
         results.rows[1].vsls = None;
         results.write(folder.path()).unwrap();

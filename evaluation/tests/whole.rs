@@ -1,7 +1,9 @@
 //! Evaluates a scene with tiny pictures from its config to the page, and opens the page in a browser.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
-use photonstream_evaluation::{EvaluateError, Observer, Options, evaluate, plan::Effort, results::Results};
+use photonstream_evaluation::{
+    EvaluateError, Observer, Options, device, evaluate, hard_cases, plan::Effort, results::Results,
+};
 use std::{
     path::{Path, PathBuf},
     process::Command,
@@ -23,9 +25,13 @@ fn options(out: &Path, points: &[&str]) -> Options {
     }
 }
 
+/// These tests are of the processor's cores; those of a device are where there is one.
+const NO_DEVICE: &str = "no device in this test";
+
 fn run(options: &Options) -> Results {
     let cancelled = AtomicBool::new(false);
-    evaluate(options, Observer { progress: &|_, _| {}, cancelled: &cancelled }).unwrap()
+    evaluate(options, Err(NO_DEVICE.into()), Observer { progress: &|_, _| {}, cancelled: &cancelled })
+        .unwrap()
 }
 
 /// Everything at once: rows of every method, splits, changes; tables, and a page that a browser shows.
@@ -50,14 +56,35 @@ fn from_config_to_page() {
     assert!(!results.changes.is_empty());
     // What the renderer cannot do is named.
     assert!(results.skipped.iter().any(|s| s.what.contains("visibility ao")), "{:?}", results.skipped);
+    assert!(results.skipped.iter().any(|s| s.what == device::WITHOUT && s.why == NO_DEVICE));
+    // Hard cases: those that were run have a verdict, and no others.
+    assert_eq!(results.hard_cases.len(), hard_cases::CLOSED_FORMS.len());
+    for case in &results.hard_cases {
+        assert!(case.holds(), "{case:?}");
+    }
     let lines = std::fs::read_to_string(out.join("results.csv")).unwrap().lines().count();
     assert_eq!(lines, results.rows.len() + 1);
     let page = std::fs::read_to_string(out.join("index.html")).unwrap();
     if let Some(kept) = std::env::var_os("PHOTONSTREAM_KEEP_REPORT") {
         std::fs::write(kept, &page).unwrap();
     }
-    for part in ["<svg", "data:image/png;base64,", "prefers-color-scheme", "Pareto", "What was left out"] {
+    for part in [
+        "<svg",
+        "data:image/png;base64,",
+        "prefers-color-scheme",
+        "Pareto",
+        "What was left out",
+        "id=\"hard-cases\"",
+        NO_DEVICE,
+    ] {
         assert!(page.contains(part), "{part}");
+    }
+    let rows = page.matches("<span class=\"verdict ").count();
+    assert_eq!(rows, hard_cases::cases().len());
+    assert_eq!(page.matches("<span class=\"verdict yes\">pass</span>").count(), results.hard_cases.len());
+    // Every point's command is beside what shows it: in charts' lists, tables, pictures and the list of all.
+    for row in &results.rows {
+        assert!(page.matches(&row.command.replace('&', "&amp;")).count() >= 2, "{}", row.command);
     }
     let text = page.replace("http://www.w3.org/2000/svg", "");
     for outside in ["http://", "https://", "<script", "url("] {
@@ -87,6 +114,7 @@ fn a_point_is_repeated_by_its_text() {
     }
     let error = evaluate(
         &options(folder.path(), &["path-tracing:vsls=3"]),
+        Err(NO_DEVICE.into()),
         Observer { progress: &|_, _| {}, cancelled: &AtomicBool::new(false) },
     );
     assert!(matches!(error, Err(EvaluateError::Point { .. })));
@@ -104,7 +132,7 @@ fn an_interrupted_evaluation_leaves_what_it_has() {
         }
     };
     let observer = Observer { progress: &progress, cancelled: &cancelled };
-    let error = evaluate(&options(folder.path(), &[]), observer).unwrap_err();
+    let error = evaluate(&options(folder.path(), &[]), Err(NO_DEVICE.into()), observer).unwrap_err();
     assert!(error.is_cancelled(), "{error}");
     let json: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("results.json")).unwrap()).unwrap();
@@ -155,6 +183,51 @@ fn opens_in_a_browser(page: &Path) {
         means.push(mean);
     }
     assert!(means[0] > means[1] + 100.0, "light and dark look alike: {means:?}");
+    for width in [400, 1280] {
+        fits(page, &browser, width);
+    }
+}
+
+/// What a copy of the page tells of itself: its width, and that of what it holds, all that is folded unfolded; height and
+/// rows of the section of hard cases.
+const PROBE: &str = "<script>addEventListener('load',()=>{document.querySelectorAll('details').forEach(d=>d.open=true);\
+    const s=document.getElementById('hard-cases'),r=document.documentElement;\
+    parent.postMessage([innerWidth,r.scrollWidth,s?Math.round(s.getBoundingClientRect().height):0,\
+    s?[...s.querySelectorAll('tbody tr')].filter(t=>t.getBoundingClientRect().height>0).length:0].join(' '),'*')})</script>";
+
+/// In a frame of `width` pixels (windows of this browser are 500 wide or more) nothing sticks out to the side, tables in their
+/// own scrolling frames excepted, and the hard cases are there, each row with a height.
+fn fits(page: &Path, browser: &Path, width: u32) {
+    let folder = page.parent().unwrap();
+    let text = std::fs::read_to_string(page).unwrap().replace("</body>", &format!("{PROBE}</body>"));
+    std::fs::write(folder.join("probe.html"), text).unwrap();
+    let outer = folder.join(format!("outer-{width}.html"));
+    let frame = format!(
+        "<!doctype html><title>-</title><script>onmessage=e=>{{document.title=e.data}}</script>\
+         <iframe src=\"probe.html\" style=\"width:{width}px;height:900px;border:0\"></iframe>"
+    );
+    std::fs::write(&outer, frame).unwrap();
+    let output = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--window-size=1400,1000",
+            "--virtual-time-budget=10000",
+        ])
+        .arg(format!("--user-data-dir={}", folder.join(format!("profile-{width}")).display()))
+        .arg("--dump-dom")
+        .arg(format!("file://{}", outer.canonicalize().unwrap().display()))
+        .output()
+        .unwrap();
+    let dom = String::from_utf8_lossy(&output.stdout);
+    let title = dom.split_once("<title>").and_then(|(_, rest)| rest.split_once("</title>")).unwrap().0;
+    let told: Vec<u32> = title.split(' ').filter_map(|n| n.parse().ok()).collect();
+    let [inner, content, height, rows] = told[..] else { panic!("the page did not tell: {title}") };
+    // A vertical scroll bar takes some of it, where bars are not hidden.
+    assert!(inner == width && content <= inner, "{content} pixels in a page of {inner}");
+    assert_eq!(rows as usize, hard_cases::cases().len(), "rows of hard cases that are shown");
+    assert!(height > 40 * rows / 2, "the section of hard cases is {height} pixels high");
 }
 
 fn chromium() -> Option<PathBuf> {

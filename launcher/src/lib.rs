@@ -9,6 +9,8 @@ mod assignment;
 mod backend;
 mod cli;
 mod commands;
+#[cfg(feature = "wgpu")]
+mod device;
 mod error;
 mod exit;
 mod follow;

@@ -1,6 +1,7 @@
 //! Turns a point into a picture and the time it takes: each method on the same scene, rays and cores.
 
 mod instant_radiosity;
+mod on_device;
 mod paper_a;
 mod photon_streaming;
 
@@ -76,7 +77,7 @@ impl Bench {
         Self { scene, size, placed: HashMap::new(), threads: HashMap::new() }
     }
 
-    /// Measures one point.
+    /// Measures one point, on processor cores; those of a graphics device are [`Bench::shoot_on`]'s.
     ///
     /// # Errors
     /// Those of the renderer: cancelled, or a setting that it does not have.
@@ -141,6 +142,10 @@ impl Bench {
     }
 
     fn picture(&self, point: &Point, vsls: &VslSet, watch: Watch<'_>) -> Result<Film, EvaluateError> {
+        Ok(render(&self.scene, vsls, &self.options(point), watch)?.film)
+    }
+
+    fn options(&self, point: &Point) -> RenderOptions {
         let mut options = RenderOptions::from_settings(&self.scene.render);
         (options.width, options.height) = self.size;
         options.layers = vec![LayerKind::Full, LayerKind::Indirect];
@@ -152,7 +157,7 @@ impl Bench {
             Method::InstantRadiosityBounded => (Kernel::Disc, point.visibility),
             _ => (point.kernel, point.visibility),
         };
-        Ok(render(&self.scene, vsls, &options, watch)?.film)
+        options
     }
 
     fn path_traced(
@@ -177,7 +182,7 @@ impl Bench {
     /// What is placed once for a scene, whatever is rendered of it.
     fn prepare(&mut self, point: &Point) -> Option<(Simulation, f64)> {
         let is_as_paper = match point.method {
-            Method::PhotonStreaming => false,
+            Method::PhotonStreaming | Method::PhotonStreamingGpu => false,
             Method::PaperA => true,
             _ => return None,
         };
@@ -190,8 +195,13 @@ impl Bench {
 
     /// The simulation of a point of photon streaming, its pool empty.
     pub fn simulation(&mut self, point: &Point) -> Simulation {
+        self.placed_for(point).0
+    }
+
+    /// The same, and the time that placing its lights took, ms.
+    fn placed_for(&mut self, point: &Point) -> (Simulation, f64) {
         let point = Point { method: Method::PhotonStreaming, ..point.clone() };
         let prepared = self.prepare(&point);
-        prepared.expect("invariant: photon streaming is prepared").0
+        prepared.expect("invariant: photon streaming is prepared")
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{EvaluateError, point::Point};
 use photonstream_film::Film;
+use photonstream_protocol::VslFrame;
 use photonstream_renderer::{RenderOptions, VslSet, Watch};
 use photonstream_renderer_cpu::render;
 use photonstream_scene::{Sampling, Scene};
@@ -60,14 +61,32 @@ pub(crate) fn with_scene_and_pool(base: &Simulation, scene: Scene) -> Simulation
 /// Fills the pool and reads the flux: the lights, and the time in ms. A stream of fresh samples is timed, and read, in its
 /// second turn, when all its slots hold a path to be replaced.
 pub(crate) fn lights_of(simulation: &Simulation) -> Result<(VslSet, f64), EvaluateError> {
+    timed(simulation, |ledger| vsls_of(simulation, ledger))
+}
+
+/// The same as a frame that a simulator would publish: its records alone.
+pub(super) fn frame_of(simulation: &Simulation) -> Result<(VslFrame, f64), EvaluateError> {
+    timed(simulation, |ledger| {
+        let scene = &simulation.scene;
+        let mut vsls = records::vsl_records(scene, &simulation.placement);
+        records::write_flux(&mut vsls, ledger.readings(scene), 0);
+        let patches = records::patch_records(scene, &simulation.placement);
+        Ok(VslFrame { epoch: 1, frame: 1, vsls, patches, ..VslFrame::default() })
+    })
+}
+
+fn timed<T>(
+    simulation: &Simulation,
+    read: impl FnOnce(&Ledger) -> Result<T, EvaluateError>,
+) -> Result<(T, f64), EvaluateError> {
     let mut begun = Instant::now();
     let mut ledger = simulation.fill();
     if simulation.scene.streaming.sampling == Sampling::Fresh {
         begun = Instant::now();
         simulation.advance(&mut ledger, tasks(simulation));
     }
-    let vsls = vsls_of(simulation, &ledger)?;
-    Ok((vsls, begun.elapsed().as_secs_f64() * 1e3))
+    let light = read(&ledger)?;
+    Ok((light, begun.elapsed().as_secs_f64() * 1e3))
 }
 
 /// Tasks that are a turn of the whole pool.

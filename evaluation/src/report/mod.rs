@@ -1,7 +1,11 @@
 //! Turns results into one page that needs nothing but itself: no network, no script, charts and pictures inside.
 
+mod accumulation;
+mod again;
 mod bars;
 mod charts;
+mod choose;
+mod hard_cases;
 mod page;
 mod portrait;
 mod scene_section;

@@ -1,6 +1,6 @@
 //! Turns results into the text of the page.
 
-use super::{SceneSheet, escape, scene_section};
+use super::{SceneSheet, escape, hard_cases, scene_section};
 use crate::{EvaluateError, results::Results};
 
 const STYLE: &str = include_str!("style.css");
@@ -40,17 +40,21 @@ pub(super) fn page(results: &Results, sheets: &[SceneSheet]) -> Result<String, E
          <link rel=\"icon\" href=\"data:,\"><title>photonstream: speed against error</title><style>{STYLE}</style></head>\
          <body><a class=\"skip\" href=\"#main\">Skip to the results</a>\
          <header><h1>Speed against error</h1>\
-         <p>{cpu}, {cores} cores; commit <code>{commit}</code>; {points} points in {seconds:.0} s. \
+         <p>{cpu}, {cores} cores; {adapter}; commit <code>{commit}</code>; {points} points in {seconds:.0} s. \
          Tables as files: <a href=\"results.csv\">results.csv</a>, <a href=\"results.json\">results.json</a>.</p>\
-         <nav aria-label=\"Sections\"><ul>{links}<li><a href=\"#how\">How it is measured</a></li>\
+         <p>All of it again: <code>{command}</code></p>\
+         <nav aria-label=\"Sections\"><ul>{links}<li><a href=\"#hard-cases\">Hard cases</a></li><li><a href=\"#how\">How it is measured</a></li>\
          <li><a href=\"#skipped\">What was left out</a></li></ul></nav></header>\
-         <main id=\"main\" tabindex=\"-1\">{state}{sections}{HOW}\
+         <main id=\"main\" tabindex=\"-1\">{state}{sections}{hard_cases}{HOW}\
          <section id=\"skipped\"><h2>What was left out, and why</h2><ul>{skipped}</ul></section></main></body></html>\n",
         cpu = escape(&machine.cpu),
         cores = machine.cores,
+        adapter = results.adapter.as_ref().map_or("no graphics device".into(), |name| escape(name)),
+        command = escape(&results.command),
         commit = escape(&machine.commit),
         points = results.rows.len(),
         seconds = results.seconds,
+        hard_cases = hard_cases::section(&results.hard_cases),
     ))
 }
 

@@ -1,6 +1,6 @@
 //! Turns measured pictures into those worth showing, side by side with their errors.
 
-use super::{escape, figure, series::kind, time};
+use super::{again, escape, figure, series::kind, time};
 use crate::{
     EvaluateError,
     flip::{Exposure, flip},
@@ -39,7 +39,7 @@ pub struct SceneSheet {
 }
 
 /// Most pictures of one scene.
-const MOST: usize = 12;
+const MOST: usize = 16;
 
 impl SceneSheet {
     /// A scene without pictures yet.
@@ -110,14 +110,15 @@ impl SceneSheet {
             let settings = settings(row);
             out.push_str(&format!(
                 "<figure><div class=\"trio\">{}</div><figcaption><strong>{}</strong><br>{}<br>{}: relative RMSE {}, bias \
-                 {:+.1} %, FLIP {}</figcaption></figure>",
+                 {:+.1} %, FLIP {}{}</figcaption></figure>",
                 trio.concat(),
                 escape(&name),
                 escape(&settings),
                 time(row.total_ms),
                 figure(row.rel_rmse),
                 100.0 * row.bias,
-                figure(row.flip)
+                figure(row.flip),
+                again::command(&row.command)
             ));
         }
         out.push_str("</div>");
@@ -138,6 +139,8 @@ pub(super) fn settings(row: &Row) -> String {
     add(" paths", row.pool_paths.map(|v| v.to_string()));
     add("", row.kernel.clone().map(|k| format!("kernel {k}")));
     add("", row.visibility.clone().map(|v| format!("visibility {v}")));
+    add("", row.accumulation.clone());
+    add("", row.interleave.filter(|&n| n > 1).map(|n| format!("interleave {n}")));
     add("", row.sampling.clone().filter(|s| s != "replay"));
     add(" paths per pixel", row.spp.map(|v| v.to_string()));
     add("", (row.threads != row.cores).then(|| format!("{} threads", row.threads)));

@@ -1,14 +1,15 @@
 //! Turns what was measured of one scene into a section of the page.
 
 use super::{
-    SceneSheet, bars,
+    SceneSheet, accumulation, again, bars,
     charts::{Chart, log_log},
-    escape, figure,
+    choose, escape, figure,
     series::{of_sweep, setting_against_error, time_against_error},
     tables, time,
 };
 use crate::{
     EvaluateError, plan,
+    point::Method,
     results::{Results, Row},
 };
 
@@ -32,9 +33,13 @@ pub(super) fn section(results: &Results, sheet: &SceneSheet, index: usize) -> Re
         figure(sheet.noise.full),
         figure(sheet.noise.indirect)
     ));
+    let fully_threaded = |r: &&Row| r.threads == rows[0].threads || r.spp.is_some();
+    let candidates: Vec<&Row> = rows.iter().copied().filter(fully_threaded).collect();
+    out.push_str(&choose::tables(&candidates, sheet.noise.full));
+    // A device has cores of its own: what it draws is no point at equal cores.
     // The sweeps of one setting have points that are slower and no better; they are measured, and count.
     let timed: Vec<&Row> =
-        rows.iter().copied().filter(|r| r.threads == rows[0].threads || r.spp.is_some()).collect();
+        candidates.into_iter().filter(|r| r.method != Method::PhotonStreamingGpu.name()).collect();
     out.push_str("<h3>Error against time</h3>");
     out.push_str("<p>Full picture. Time is light and picture, on the same cores, rays and scene.</p>");
     let chart = Chart {
@@ -45,6 +50,7 @@ pub(super) fn section(results: &Results, sheet: &SceneSheet, index: usize) -> Re
         floor: Some(sheet.noise.full),
     };
     out.push_str(&log_log(chart, &time_against_error(&timed, |row| row.rel_rmse))?);
+    out.push_str(&again::points("of this chart", &timed, "rel. RMSE", |row| row.rel_rmse));
     out.push_str(&tables::budgets(&timed));
     out.push_str("<h3>Indirect light alone</h3>");
     let chart = Chart {
@@ -53,10 +59,12 @@ pub(super) fn section(results: &Results, sheet: &SceneSheet, index: usize) -> Re
         ..chart
     };
     out.push_str(&log_log(chart, &time_against_error(&timed, |row| row.rel_rmse_indirect))?);
+    out.push_str(&again::points("of this chart", &timed, "rel. RMSE, indirect", |row| row.rel_rmse_indirect));
     out.push_str("<h3>Side by side</h3><p>Of each method the picture with the least error in the time that the scene's own \
                   settings take, or its fastest.</p>");
     out.push_str(&sheet.html()?);
     out.push_str(&settings_charts(&rows, sheet)?);
+    out.push_str(&accumulation::part(results, &rows));
     out.push_str(&causes(results, sheet)?);
     out.push_str(&modelled(sheet));
     out.push_str(&format!(
@@ -86,6 +94,9 @@ fn settings_charts(rows: &[&Row], sheet: &SceneSheet) -> Result<String, Evaluate
         );
         let says = "Relative RMSE of indirect light against the number of virtual surface lights";
         out.push_str(&log_log(Chart { says, x: "virtual surface lights", ..chart }, &series)?);
+        out.push_str(&again::points("of this chart", &vsls, "rel. RMSE, indirect", |row| {
+            row.rel_rmse_indirect
+        }));
     }
     let pool = of_sweep(rows, plan::POOL);
     if !pool.is_empty() {
@@ -94,6 +105,9 @@ fn settings_charts(rows: &[&Row], sheet: &SceneSheet) -> Result<String, Evaluate
             setting_against_error(&pool, |r| r.pool_paths.map(f64::from), |_| "Paths in the pool".into());
         let says = "Relative RMSE of indirect light against the paths in the pool";
         out.push_str(&log_log(Chart { says, x: "paths in the pool", ..chart }, &series)?);
+        out.push_str(&again::points("of this chart", &pool, "rel. RMSE, indirect", |row| {
+            row.rel_rmse_indirect
+        }));
     }
     let shading = of_sweep(rows, plan::SHADING);
     if !shading.is_empty() {
@@ -131,6 +145,7 @@ fn causes(results: &Results, sheet: &SceneSheet) -> Result<String, EvaluateError
         ));
         out.push_str(&bars::splits(&splits)?);
         out.push_str(&tables::splits(&splits));
+        out.push_str(&whole(results));
     }
     let changes: Vec<_> = results.changes.iter().filter(|c| c.scene == sheet.name).collect();
     if !changes.is_empty() {
@@ -138,8 +153,14 @@ fn causes(results: &Results, sheet: &SceneSheet) -> Result<String, EvaluateError
                       published light of all surfaces has gone 95 % of the way to the new one, and stays there. Medians.</p>");
         out.push_str(&bars::changes(&changes)?);
         out.push_str(&tables::changes(&changes));
+        out.push_str(&whole(results));
     }
     Ok(out)
+}
+
+/// The command of numbers that no point has alone.
+fn whole(results: &Results) -> String {
+    format!("<p class=\"note\">Measured again by <code>{}</code></p>", escape(&results.command))
 }
 
 fn modelled(sheet: &SceneSheet) -> String {

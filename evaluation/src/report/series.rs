@@ -34,13 +34,14 @@ pub(super) fn css(look: usize) -> String {
 pub(super) fn kind(row: &Row) -> String {
     let method = row.method.as_str();
     match method {
-        _ if method == Method::PhotonStreaming.name() => {
+        _ if method == Method::PhotonStreaming.name() || method == Method::PhotonStreamingGpu.name() => {
+            let place = if method == Method::PhotonStreaming.name() { "" } else { " on the GPU" };
             let shadows = match row.visibility.as_deref() {
                 Some("none") | None => "no indirect shadows".into(),
                 Some("rays") => "shadow rays".into(),
                 Some(other) => format!("{other} shadows"),
             };
-            format!("Photon streaming, {shadows}")
+            format!("Photon streaming{place}, {shadows}")
         }
         _ if method == Method::PathTracing.name() => "Path tracing".into(),
         _ if method == Method::InstantRadiosity.name() => "Instant radiosity".into(),

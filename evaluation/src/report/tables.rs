@@ -1,7 +1,7 @@
 //! Turns rows into tables.
 
 use super::{
-    escape, figure,
+    again, escape, figure,
     portrait::settings,
     series::{kind, kinds},
     time,
@@ -13,13 +13,19 @@ use crate::{
 };
 
 /// A table in a frame that scrolls by itself, by keyboard, too.
-fn framed(label: &str, head: &[&str], body: &str) -> String {
+pub(super) fn framed(label: &str, head: &[&str], body: &str) -> String {
     let head: String = head.iter().map(|h| format!("<th scope=\"col\">{}</th>", escape(h))).collect();
     format!(
         "<div class=\"scroll\" role=\"region\" aria-label=\"{}\" tabindex=\"0\"><table><thead><tr>{head}</tr></thead>\
          <tbody>{body}</tbody></table></div>",
         escape(label)
     )
+}
+
+/// The same, its rows shown as cards on narrow pages, where each cell says its column (`data-name`). Such rows are of words.
+pub(super) fn cards(label: &str, head: &[&str], body: &str) -> String {
+    // The role, because a table that is not laid out as one is none to some screen readers.
+    framed(label, head, body).replacen("<table>", "<table class=\"cards\" role=\"table\">", 1)
 }
 
 /// Times a picture may take, ms.
@@ -38,6 +44,7 @@ pub(super) fn budgets(rows: &[&Row]) -> String {
         pareto::best_within(&points, budget).map(|i| *rows[i])
     };
     let mut body = String::new();
+    let mut shown: Vec<&Row> = Vec::new();
     for name in &kinds {
         body.push_str(&format!("<tr><th scope=\"row\">{}</th>", escape(name)));
         for budget in BUDGETS {
@@ -45,6 +52,9 @@ pub(super) fn budgets(rows: &[&Row]) -> String {
             body.push_str(&match best(&|row| kind(row) == *name, budget) {
                 Some(row) => {
                     let class = if Some(row.rel_rmse) == of_all { " class=\"best\"" } else { "" };
+                    if !shown.iter().any(|known: &&Row| std::ptr::eq(*known, row)) {
+                        shown.push(row);
+                    }
                     let says = format!("{}, {}", settings(row), time(row.total_ms));
                     format!("<td{class} title=\"{}\">{}</td>", escape(&says), figure(row.rel_rmse))
                 }
@@ -63,7 +73,8 @@ pub(super) fn budgets(rows: &[&Row]) -> String {
         });
     }
     body.push_str("</tr>");
-    framed("Least error within a time", &names, &body)
+    let table = framed("Least error within a time", &names, &body);
+    table + &again::points("of this table", &shown, "rel. RMSE", |row| row.rel_rmse)
 }
 
 /// Everything that was measured, with the commands that measure it again.
@@ -161,7 +172,7 @@ pub(super) fn changes(changes: &[&StepChange]) -> String {
 
 /// One setting with nothing else changed: threads, sampling.
 pub(super) fn sweep(label: &str, rows: &[&Row], setting: fn(&Row) -> String) -> String {
-    let head = [label, "light", "picture", "total", "rel. RMSE", "indirect", "bias"];
+    let head = [label, "light", "picture", "total", "rel. RMSE", "indirect", "bias", "repeat"];
     let body: String = rows
         .iter()
         .map(|row| {
@@ -172,6 +183,7 @@ pub(super) fn sweep(label: &str, rows: &[&Row], setting: fn(&Row) -> String) -> 
                 figure(row.rel_rmse),
                 figure(row.rel_rmse_indirect),
                 format!("{:+.2} %", 100.0 * row.bias),
+                again::command(&row.command),
             ];
             let cells: String = cells.iter().map(|c| format!("<td>{c}</td>")).collect();
             format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", escape(&setting(row)))

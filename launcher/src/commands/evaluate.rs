@@ -1,7 +1,9 @@
 //! Turns scenes into speed against error: tables and a page.
 
+#[cfg(feature = "wgpu")]
+use crate::device::GpuDevice;
 use crate::{cli::Global, error::LauncherError, output, progress::Share, signals::Listener};
-use photonstream_evaluation::{Observer, Options, evaluate, plan::Effort};
+use photonstream_evaluation::{Observer, Options, device::Offered, evaluate, plan::Effort};
 use photonstream_renderer::cli::Size;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -10,14 +12,16 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Writes results.csv, results.json and index.html, a page that needs no network, into DIR. An interrupted evaluation leaves what
-was measured until then. References are kept, and found again by scene, size and paths per pixel.
+was measured until then. References are kept, and found again by scene, size and paths per pixel. Accumulations of the GPU
+renderer are measured where there is an adapter; the report names it, or says why there is none.
 
 Examples:
   photonstream evaluate configs/cornell-box.toml --out out/evaluation
   photonstream evaluate configs/cornell-box.toml configs/two-rooms.toml --out out/evaluation --quick
   photonstream evaluate configs/cornell-box.toml --out again --point photon-streaming:vsls=200,visibility=none
+  photonstream evaluate configs/cornell-box.toml --out again --point photon-streaming-gpu:accumulation=splat,visibility=none
 
-JSON: { \"complete\", \"seconds\", \"points\", \"page\", \"csv\", \"json\": paths, \"cpu\", \"cores\", \"commit\", \"skipped\": [ { \"what\",
+JSON: { \"complete\", \"seconds\", \"points\", \"page\", \"csv\", \"json\": paths, \"cpu\", \"cores\", \"adapter\": or null, \"commit\", \"skipped\": [ { \"what\",
   \"why\" } ] }; every measured figure is in results.json, under the names of the columns of results.csv")]
 pub(crate) struct Args {
     /// Scenes to evaluate
@@ -47,6 +51,14 @@ pub(crate) struct Args {
     /// Folder where references are kept [default: the user's cache folder, else DIR/cache]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
+    /// Measure the GPU renderer on the adapter whose name contains this [default: the most capable one]
+    #[cfg(feature = "wgpu")]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Measure the GPU renderer on a software rasteriser
+    #[cfg(feature = "wgpu")]
+    #[arg(long)]
+    software: bool,
 }
 
 #[derive(Serialize)]
@@ -59,6 +71,7 @@ struct Report {
     json: PathBuf,
     cpu: String,
     cores: usize,
+    adapter: Option<String>,
     commit: String,
     skipped: Vec<photonstream_evaluation::results::Skipped>,
 }
@@ -81,7 +94,16 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         bar.set(share);
         bar.say(what.to_owned());
     };
-    let measured = evaluate(&options, Observer { progress: &progress, cancelled: &cancelled });
+    #[cfg(feature = "wgpu")]
+    let mut device = gpu(args)?;
+    #[cfg(feature = "wgpu")]
+    let device: Offered<'_> = match &mut device {
+        Ok(device) => Ok(device),
+        Err(reason) => Err(reason.clone()),
+    };
+    #[cfg(not(feature = "wgpu"))]
+    let device: Offered<'_> = Err("this build has no GPU renderer: its feature wgpu is off".into());
+    let measured = evaluate(&options, device, Observer { progress: &progress, cancelled: &cancelled });
     drop(bar);
     let page = args.out.join("index.html");
     let results = measured.inspect_err(|_| {
@@ -98,10 +120,25 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         json: args.out.join("results.json"),
         cpu: results.machine.cpu,
         cores: results.machine.cores,
+        adapter: results.adapter,
         commit: results.machine.commit,
         skipped: results.skipped,
     };
     output::report(global.json, &report, text)
+}
+
+/// The GPU renderer, or why there is none.
+///
+/// # Errors
+/// An adapter that was asked for by name and is not there.
+#[cfg(feature = "wgpu")]
+fn gpu(args: &Args) -> Result<Result<GpuDevice, String>, LauncherError> {
+    let (name, software) = (args.adapter.clone(), args.software);
+    let was_asked_for = name.is_some() || software;
+    match GpuDevice::new(photonstream_renderer_wgpu::AdapterChoice { name, software }) {
+        Err(error) if was_asked_for => Err(photonstream_renderer::RenderError::from(error).into()),
+        other => Ok(other.map_err(|error| error.to_string())),
+    }
 }
 
 /// `$XDG_CACHE_HOME/photonstream`, else `~/.cache/photonstream`.

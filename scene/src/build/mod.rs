@@ -6,6 +6,7 @@ pub(crate) mod lights;
 mod materials;
 mod objects;
 mod settings;
+mod steady_state;
 
 use crate::{
     animation,
@@ -103,6 +104,7 @@ impl SceneConfig {
         let bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
+        notices.extend(steady_state::notice(&features, &objects, &materials));
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents);
         Ok(Scene {
             name,

@@ -1,25 +1,29 @@
 //! Turns `tests/hard-cases.md` into the list of its tests, and checks that each exists and that none of these is missing.
 
+use photonstream_evaluation::hard_cases;
 use std::path::Path;
 
-/// Every row has its six columns and names a test that is there; every test of this folder has a row.
+/// Every row names a test that is there and a command that Cargo understands; every test of this folder has a row. That
+/// every row is read is tested where it is read.
 #[test]
 fn every_case_names_a_test_that_exists() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let table = std::fs::read_to_string(root.join("tests/hard-cases.md")).unwrap();
-    let rows: Vec<Vec<&str>> = table
-        .lines()
-        .filter(|line| line.starts_with("| ") && line.contains("::"))
-        .map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect())
-        .collect();
-    assert!(rows.len() > 50, "{} rows", rows.len());
     let mut named = Vec::new();
-    for row in &rows {
-        assert_eq!(row.len(), 6, "{row:?}");
-        assert!(row.iter().all(|cell| !cell.is_empty()), "{row:?}");
-        let (file, test) = row[1].trim_matches('`').split_once("::").unwrap();
+    for case in hard_cases::cases() {
+        let (file, test) = case.test.split_once("::").unwrap();
         let source = std::fs::read_to_string(root.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
         assert!(source.contains(&format!("fn {test}(")), "{file} has no test {test}");
+        // The command in the report is of a package and a target that exist.
+        let command = case.command().unwrap();
+        let (folder, _) = file.split_once('/').unwrap();
+        let manifest = std::fs::read_to_string(root.join(folder).join("Cargo.toml")).unwrap();
+        assert!(manifest.contains(&format!("name = \"photonstream-{folder}\"")), "{command}");
+        if let Some(target) = command.split_once("--test ").and_then(|(_, rest)| rest.split(' ').next()) {
+            let tests = root.join(folder).join("tests");
+            let is_there =
+                tests.join(target).join("main.rs").exists() || tests.join(format!("{target}.rs")).exists();
+            assert!(is_there, "{command}");
+        }
         named.push((file.to_owned(), test.to_owned()));
     }
     for entry in std::fs::read_dir(root.join("tests/tests/hard")).unwrap() {

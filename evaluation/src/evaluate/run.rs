@@ -1,194 +1,75 @@
-//! Turns scenes into measured points, splits and step changes, writing results as they come.
+//! Turns one scene into its measured points, splits and step changes, writing results as they come.
 
+use super::{Observer, Options, fitted};
 use crate::{
-    EvaluateError,
+    EvaluateError, command,
+    device::{Offered, WITHOUT},
     flip::{Exposure, flip},
-    machine::Machine,
     methods::{Bench, Shot},
     metrics::compare,
     plan::{self, Effort, Planned},
     point::{Method, Point},
-    report::{self, Portrait, SceneSheet},
+    report::{Portrait, SceneSheet},
     results::{Results, Row, Skipped, StepChange},
     split::split,
     truth::{Truth, truth},
 };
 use photonstream_protocol::clean_one;
-use photonstream_renderer::{LayerKind, RenderError, Watch};
-use photonstream_scene::{Scene, SceneConfig, Visibility};
+use photonstream_renderer::{LayerKind, RenderError};
+use photonstream_scene::Visibility;
 use photonstream_shading::Kernel;
 use photonstream_simulator::bench::{DynamicOptions, run_dynamic};
-use std::{
-    path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool},
-    time::Instant,
-};
-
-/// What is to be evaluated.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Scene files.
-    pub configs: Vec<PathBuf>,
-    /// Where results go.
-    pub out: PathBuf,
-    /// Where references are kept.
-    pub cache: PathBuf,
-    /// How thorough.
-    pub effort: Effort,
-    /// Size of all pictures; `None`: the scene's proportions, few pixels.
-    pub size: Option<(u32, u32)>,
-    /// Paths per pixel of references; `None`: by effort.
-    pub reference_spp: Option<u64>,
-    /// Threads; `None`: one per core.
-    pub threads: Option<usize>,
-    /// Seed of all samples; `None`: the config's.
-    pub seed: Option<u64>,
-    /// These points alone, without splits and changes; empty: all.
-    pub points: Vec<String>,
-}
-
-/// Who is told of the progress, and who may stop it.
-#[derive(Clone, Copy)]
-pub struct Observer<'a> {
-    /// Called with the share that is done, in [0, 1], and what is being done.
-    pub progress: &'a (dyn Fn(f64, &str) + Sync),
-    /// Set to true to stop.
-    pub cancelled: &'a AtomicBool,
-}
-
-impl Observer<'_> {
-    fn watch(&self) -> Watch<'_> {
-        Watch { progress: None, cancelled: Some(self.cancelled) }
-    }
-}
-
-/// Evaluates scenes; `results.csv`, `results.json` and `index.html` in `options.out` hold all of it.
-///
-/// After an error, and after a cancelled evaluation, they hold what was measured before, and say so.
-///
-/// # Errors
-/// [`EvaluateError`].
-pub fn evaluate(options: &Options, observer: Observer<'_>) -> Result<Results, EvaluateError> {
-    std::fs::create_dir_all(&options.out).map_err(|e| EvaluateError::write(&options.out, e))?;
-    let begun = Instant::now();
-    let mut results = Results::new(Machine::here());
-    results.skipped = left_out();
-    let mut sheets = Vec::new();
-    let mut outcome = Ok(());
-    for (index, config) in options.configs.iter().enumerate() {
-        let count = options.configs.len() as f64;
-        let progress = |share: f64, what: &str| {
-            (observer.progress)((index as f64 + share) / count, what);
-        };
-        let observer = Observer { progress: &progress, ..observer };
-        outcome = scene(config, options, observer, &mut results, &mut sheets);
-        if outcome.is_err() {
-            break;
-        }
-    }
-    results.complete = outcome.is_ok();
-    results.seconds = begun.elapsed().as_secs_f64();
-    results.write(&options.out)?;
-    report::write(&results, &sheets, &options.out)?;
-    outcome.map(|()| results)
-}
-
-/// What no evaluation has.
-fn left_out() -> Vec<Skipped> {
-    let skipped = |what: &str, why: &str| Skipped { what: what.into(), why: why.into() };
-    vec![
-        skipped(
-            "path tracing with Open Image Denoise",
-            "no binding to the library is built in; the library was installed on none of the machines this was written on",
-        ),
-        skipped(
-            "the GPU renderer",
-            "figures here are of processor cores, which every method uses in the same way",
-        ),
-        skipped("accumulation (splat, tiled)", "a choice of the GPU renderer alone"),
-        skipped(
-            "HDR-FLIP",
-            "FLIP is measured on the tone-mapped picture: the library has the variant for displays alone",
-        ),
-    ]
-}
-
-fn scene(
-    config: &Path,
-    options: &Options,
-    observer: Observer<'_>,
-    results: &mut Results,
-    sheets: &mut Vec<SceneSheet>,
-) -> Result<(), EvaluateError> {
-    let mut loaded = SceneConfig::from_file(config)?.build()?;
-    // A moving scene is measured as it is loaded.
-    loaded.animation = Arc::default();
-    loaded.streaming.seed = options.seed.unwrap_or(loaded.streaming.seed);
-    let scene = Arc::new(loaded);
-    let size = options.size.unwrap_or_else(|| fitted(&scene, options.effort.pixels()));
-    let spp = options.reference_spp.unwrap_or(options.effort.reference_spp());
-    (observer.progress)(0.0, "reference");
-    let reported = |share: f64| (observer.progress)(0.15 * share, "reference");
-    let watch = Watch { progress: Some(&reported), cancelled: Some(observer.cancelled) };
-    let truth = truth(&scene, size, spp, &options.cache, watch)?;
-    sheets.push(SceneSheet::new(&scene, &truth));
-    let threads =
-        options.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let base = Point::of_scene(&scene, threads);
-    let bench = Bench::new(Arc::clone(&scene), size);
-    let mut run = Run { config, options, observer, truth: &truth, spp, bench, results };
-    run.warm_up(&base)?;
-    if !options.points.is_empty() {
-        for text in &options.points {
-            let point =
-                base.parse(text).map_err(|reason| EvaluateError::Point { text: text.clone(), reason })?;
-            run.point(&Planned { sweeps: "point".into(), point }, sheets)?;
-        }
-        return Ok(());
-    }
-    let planned = plan::plan(&base, options.effort);
-    let count = planned.len() as f64;
-    for (index, planned) in planned.iter().enumerate() {
-        (observer.progress)(0.15 + 0.45 * index as f64 / count, &planned.point.to_string());
-        run.point(planned, sheets)?;
-    }
-    run.path_tracing(&base, sheets)?;
-    run.splits(&base)?;
-    run.changes(&base)
-}
-
-/// The scene's proportions with about `pixels` pixels.
-fn fitted(scene: &Scene, pixels: u32) -> (u32, u32) {
-    let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
-    let scale = (f64::from(pixels) / (width * height)).sqrt();
-    let round = |x: f64| (x * scale).round().max(1.0) as u32;
-    (round(width), round(height))
-}
+use std::{path::Path, sync::Arc};
 
 /// The evaluation of one scene.
-struct Run<'a> {
-    config: &'a Path,
-    options: &'a Options,
-    observer: Observer<'a>,
-    truth: &'a Truth,
-    spp: u64,
-    bench: Bench,
-    results: &'a mut Results,
+pub(super) struct Run<'a, 'd> {
+    pub(super) config: &'a Path,
+    pub(super) options: &'a Options,
+    pub(super) observer: Observer<'a>,
+    pub(super) truth: &'a Truth,
+    pub(super) spp: u64,
+    pub(super) bench: Bench,
+    pub(super) device: &'a mut Offered<'d>,
+    pub(super) results: &'a mut Results,
 }
 
-impl Run<'_> {
+impl Run<'_, '_> {
     /// Threads, caches and clock rates are up before anything is timed.
-    fn warm_up(&mut self, base: &Point) -> Result<(), EvaluateError> {
+    pub(super) fn warm_up(&mut self, base: &Point) -> Result<(), EvaluateError> {
         let (vsls, pool) = (50, 4096);
         let point = Point { vsls, pool, visibility: Visibility::None, ..base.clone() };
         self.bench.shoot(&point, self.observer.watch()).map(drop)
     }
 
     /// Measures one point and writes all that is known; what the renderer does not have is left out and named.
-    fn point(&mut self, planned: &Planned, sheets: &mut [SceneSheet]) -> Result<Option<f64>, EvaluateError> {
+    pub(super) fn point(
+        &mut self,
+        planned: &Planned,
+        sheets: &mut [SceneSheet],
+    ) -> Result<Option<f64>, EvaluateError> {
         let point = &planned.point;
-        let shot = match self.bench.shoot(point, self.observer.watch()) {
+        let watch = self.observer.watch();
+        let shot = match self.device.as_deref_mut() {
+            _ if point.method != Method::PhotonStreamingGpu => self.bench.shoot(point, watch),
+            Ok(device) => self.bench.shoot_on(device, point, watch),
+            Err(reason) => {
+                let why = reason.clone();
+                self.skip(WITHOUT.into(), why);
+                return Ok(None);
+            }
+        };
+        let shot = match shot {
             Ok(shot) => shot,
+            // What an adapter cannot do is no reason to end.
+            Err(EvaluateError::Render(error @ (RenderError::Option { .. } | RenderError::Device(_))))
+                if point.method == Method::PhotonStreamingGpu =>
+            {
+                let shown = (&point.accumulation, point.interleave, point.visibility.name());
+                let what =
+                    format!("the GPU renderer: {}, interleave {}, visibility {}", shown.0, shown.1, shown.2);
+                self.skip(what, error.to_string());
+                return Ok(None);
+            }
             Err(EvaluateError::Render(error @ RenderError::Option { option, .. })) => {
                 let what = match option {
                     "visibility" => format!("visibility {}", point.visibility.name()),
@@ -257,6 +138,9 @@ impl Run<'_> {
             visibility: shadows.map(|v| v.name().into()),
             sampling: is("sampling").then(|| point.sampling.name().into()),
             light_samples: is("light_samples").then_some(point.light_samples),
+            accumulation: is("accumulation").then(|| point.accumulation.clone()),
+            interleave: is("interleave").then_some(point.interleave),
+            adapter: if is("accumulation") { self.results.adapter.clone() } else { None },
             spp: is("spp").then_some(point.spp),
             width_px: width,
             height_px: height,
@@ -276,25 +160,22 @@ impl Run<'_> {
             reference_noise: truth.noise.full,
             reference_noise_indirect: truth.noise.indirect,
             at_noise_floor: full.rel_rmse < std::f64::consts::SQRT_2 * truth.noise.full,
-            command: self.command(point, (width, height)),
+            command: command::of_point(
+                self.config,
+                (width, height),
+                self.spp,
+                point,
+                &self.device.as_ref().map_or(String::new(), |d| d.arguments()),
+            ),
         })
     }
 
-    fn command(&self, point: &Point, (width, height): (u32, u32)) -> String {
-        let config = self.config.display().to_string();
-        let config = if config.contains([' ', '\'', '"', '$']) {
-            format!("'{}'", config.replace('\'', r"'\''"))
-        } else {
-            config
-        };
-        format!(
-            "photonstream evaluate {config} --out again --size {width}x{height} --spp {} --point {point}",
-            self.spp
-        )
-    }
-
     /// Path tracing with more and more paths, until the time is over.
-    fn path_tracing(&mut self, base: &Point, sheets: &mut [SceneSheet]) -> Result<(), EvaluateError> {
+    pub(super) fn path_tracing(
+        &mut self,
+        base: &Point,
+        sheets: &mut [SceneSheet],
+    ) -> Result<(), EvaluateError> {
         let mut spp = 2;
         loop {
             let point = Point { method: Method::PathTracing, spp, ..base.clone() };
@@ -310,7 +191,7 @@ impl Run<'_> {
     }
 
     /// The split of every kernel and visibility, in pictures of a quarter of the pixels.
-    fn splits(&mut self, base: &Point) -> Result<(), EvaluateError> {
+    pub(super) fn splits(&mut self, base: &Point) -> Result<(), EvaluateError> {
         let scene = Arc::clone(&self.bench.scene);
         let size = fitted(&scene, self.truth.film.width() * self.truth.film.height() / 4);
         let truth = truth(&scene, size, self.spp, &self.options.cache, self.observer.watch())?;
@@ -334,7 +215,7 @@ impl Run<'_> {
     }
 
     /// How long light takes to follow a step change, with the simulator running as it does for renderers.
-    fn changes(&mut self, base: &Point) -> Result<(), EvaluateError> {
+    pub(super) fn changes(&mut self, base: &Point) -> Result<(), EvaluateError> {
         (self.observer.progress)(0.93, "step changes");
         self.observer.watch().check()?;
         let scene = &self.bench.scene;
