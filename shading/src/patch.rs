@@ -29,7 +29,9 @@ pub fn form_factor(corners: &[Vec3], n: Vec3, middle: &mut Vec3) -> f32 {
         for &to in corners {
             let height = n.dot(to);
             if (height > 0.0) != (height_from > 0.0) && count <= MAX_CORNERS {
-                clipped[count] = from + (to - from) * (height_from / (height_from - height));
+                // Weights of both ends, each exact to ulps: of a far end and a near one the near one's digits are kept.
+                let whole = height_from - height;
+                clipped[count] = to * (height_from / whole) - from * (height / whole);
                 sum += clipped[count];
                 count += 1;
             }

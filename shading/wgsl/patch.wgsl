@@ -22,7 +22,9 @@ fn patch_form_factor(count: u32, n: vec3f) -> f32 {
         let corner = patch_corners[i];
         let height = dot(n, corner);
         if (height > 0.0) != (height_before > 0.0) {
-            let crossing = before + (corner - before) * (height_before / (height_before - height));
+            // Weights of both ends, each exact to ulps: of a far end and a near one the near one's digits are kept.
+            let whole = height_before - height;
+            let crossing = corner * (height_before / whole) - before * (height / whole);
             if found == 0u {
                 first = crossing;
             } else {
