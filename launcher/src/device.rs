@@ -144,13 +144,14 @@ mod tests {
         evaluate(&options, Ok(device), observer).unwrap().rows
     }
 
-    /// Every way gives the picture of the processor's cores: the same light, exact sums, so that errors against the
-    /// reference differ by f32 sums and by the shadow maps of direct light alone. Interleaved sampling, which mixes
-    /// neighbours, may be off by more, and is measured all the same.
+    /// Every way but the interleaved ones, which mix neighbours, gives the same picture: the same light, all of it, so that
+    /// errors differ by f32 sums alone, 10⁻³ of themselves. The light of the processor's picture is the same, too; but some
+    /// pixels on edges show the other surface, because the device rasterises them: the means are within 1 %, ten pixels of
+    /// the mean's own brightness.
     ///
-    /// 200 lights, 4 096 paths, 32 × 32 pixels; relative RMSE of indirect light within 1 % of itself.
+    /// 200 lights, 4 096 paths, 32 × 32 pixels.
     #[test]
-    fn ways_have_the_error_of_the_processor() {
+    fn ways_give_the_light_of_the_processor() {
         let Some(gpu) = test_gpu::gpu() else { return };
         let choice = AdapterChoice { name: None, software: true };
         let mut device = GpuDevice { renderer: Renderer::new(gpu).unwrap(), choice, epoch: 0 };
@@ -170,8 +171,10 @@ mod tests {
             assert_eq!(row.adapter.as_deref(), Some(device.adapter().as_str()));
             assert!(row.picture_ms > 0.0 && row.runs >= 3 && row.command.ends_with(" --software"), "{row:?}");
             if row.interleave == Some(1) {
-                let ratio = row.rel_rmse_indirect / rows[0].rel_rmse_indirect;
-                assert!((ratio - 1.0).abs() < 0.01, "{:?}: {ratio}", row.accumulation);
+                let ratio = row.rel_rmse_indirect / rows[1].rel_rmse_indirect;
+                assert!((ratio - 1.0).abs() < 1e-3, "{:?}: {ratio}", row.accumulation);
+                let bias = row.bias_indirect - rows[0].bias_indirect;
+                assert!(bias.abs() < 0.01, "{:?}: {bias}", row.accumulation);
             } else {
                 assert!(row.rel_rmse_indirect.is_finite() && row.rel_rmse_indirect > 0.0);
             }

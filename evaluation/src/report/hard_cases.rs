@@ -28,9 +28,10 @@ pub(super) fn section(checked: &[Checked]) -> String {
     if !checked.is_empty() {
         let samples = checked.iter().map(|c| c.samples).max().unwrap_or_default();
         out.push_str(&format!(
-            "<h3>Run by this evaluation</h3><p>Closed forms evaluated in f32 and in f64, {samples} samples each: the verdict \
+            "<h3>Run by this evaluation</h3><p>Closed forms evaluated in f32 and in f64, {} samples each: the verdict \
              is that of this program on this machine. Every <code>photonstream evaluate</code> runs them again with the same \
              samples; the command beside each takes ten times as many. ulp: 2⁻²³, relative, or of what the figure names.</p>{}",
+            grouped(samples),
             cards("Hard cases run by this evaluation", &HEAD, &here)
         ));
     }
@@ -74,6 +75,14 @@ fn measured(found: &Figure) -> String {
         figure(found.found),
         figure(found.limit)
     )
+}
+
+/// A count with its thousands apart: `20 000`.
+fn grouped(count: u64) -> String {
+    match (count / 1000, count % 1000) {
+        (0, ones) => ones.to_string(),
+        (thousands, ones) => format!("{thousands}\u{a0}{ones:03}"),
+    }
 }
 
 /// Text of the table as HTML: what stands between backticks is code.

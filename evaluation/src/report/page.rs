@@ -71,4 +71,6 @@ still scene needs no new light, and a change rarely needs a whole pool: see the 
 light path meets a surface, and shadow rays to all of them; bounded: 1/(π r² + A), A a light's share of all surfaces. Paper \
 A as written: f32 sums, its placement, kernel 1/(π r²), no indirect shadows, a stream of fresh paths of which the oldest is \
 taken back; read after four turns of the pool, the time is that of one.</li>\
+<li>Photon streaming on the GPU is the same light in the GPU renderer, with its own shadow maps for direct light and, for \
+visibility rays, 32 shadow rays a pixel; a frame is timed until the device has done it, without reading it back.</li>\
 <li>Every row names the command that measures it again. Times depend on what else the machine does.</li></ul></section>";
