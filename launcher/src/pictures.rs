@@ -6,7 +6,7 @@ use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
     FrameRenderer, LayerKind, RenderOptions, RenderStats, Watch, cli::Size, published::PublishedScene,
 };
-use photonstream_scene::{RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 use std::{
     path::{Path, PathBuf},
@@ -26,6 +26,12 @@ pub(crate) struct Look {
     /// Shadows of indirect light: `rays`, `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
     #[arg(long)]
     pub(crate) visibility: Option<Visibility>,
+    /// Smallest radiance worth adding, in W/(m² sr): where a light's range ends, 0 never [default: as the scene says]
+    #[arg(long, value_name = "L")]
+    pub(crate) epsilon: Option<f32>,
+    /// Lights beyond their range: `stochastic` (drawn by lot, right on average) or `cut` (skipped) [default: as the scene says]
+    #[arg(long)]
+    pub(crate) culling: Option<RangeCulling>,
 }
 
 impl Look {
@@ -40,6 +46,8 @@ impl Look {
         add("size", self.size.map(|s| s.to_string()));
         add("kernel", self.kernel.map(|k| k.name().to_owned()));
         add("visibility", self.visibility.map(|v| v.name().to_owned()));
+        add("epsilon", self.epsilon.map(|e| e.to_string()));
+        add("culling", self.culling.map(|c| c.name().to_owned()));
         arguments
     }
 
@@ -50,6 +58,8 @@ impl Look {
         }
         options.kernel = self.kernel.unwrap_or(options.kernel);
         options.visibility = self.visibility.unwrap_or(options.visibility);
+        options.epsilon = self.epsilon.unwrap_or(options.epsilon);
+        options.culling = self.culling.unwrap_or(options.culling);
         options.layers = layers.to_vec();
         options
     }

@@ -27,7 +27,8 @@ const BLOCK: usize = 256;
 /// Adds the irradiance of the selected lights to `tile`. Returns the sum over lanes of the upper bounds of what was
 /// skipped, in W m⁻² sr⁻¹.
 pub(crate) fn accumulate(set: InstructionSet, selection: &Selection, tile: &mut Tile) -> f64 {
-    let gather = Gather { near: &selection.near, partial: &selection.partial, tile };
+    let gather =
+        Gather { near: &selection.near, partial: &selection.partial, by_lot: selection.by_lot, tile };
     match set {
         InstructionSet::Detected => pulp::Arch::new().dispatch(gather),
         InstructionSet::Avx2 => avx2(gather),
@@ -51,6 +52,8 @@ fn avx2(gather: Gather<'_>) -> f64 {
 struct Gather<'a> {
     near: &'a [Emitter],
     partial: &'a [Emitter],
+    /// Whether these have drawn their ranges.
+    by_lot: bool,
     tile: &'a mut Tile,
 }
 
@@ -60,16 +63,25 @@ impl WithSimd for Gather<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         for block in self.near.chunks(BLOCK) {
-            add_block::<S, false>(simd, block, self.tile);
+            add_block::<S, false, false>(simd, block, self.tile);
         }
-        self.partial.chunks(BLOCK).map(|block| add_block::<S, true>(simd, block, self.tile)).sum()
+        let partial = self.partial.chunks(BLOCK);
+        if self.by_lot {
+            partial.map(|block| add_block::<S, true, true>(simd, block, self.tile)).sum()
+        } else {
+            partial.map(|block| add_block::<S, true, false>(simd, block, self.tile)).sum()
+        }
     }
 }
 
 /// Adds one block of lights to every pixel of the tile; with `RANGED`, lanes beyond a light's range are skipped and
-/// the bounds of what they lose are summed.
+/// the bounds of what they lose are summed; with `BY_LOT` nothing is lost, and the others make up for it.
 #[inline(always)]
-fn add_block<S: Simd, const RANGED: bool>(simd: S, lights: &[Emitter], tile: &mut Tile) -> f64 {
+fn add_block<S: Simd, const RANGED: bool, const BY_LOT: bool>(
+    simd: S,
+    lights: &[Emitter],
+    tile: &mut Tile,
+) -> f64 {
     let used = tile.used;
     let lanes = |values| S::as_simd_f32s(values).0;
     let (px, py, pz) =
@@ -79,7 +91,7 @@ fn add_block<S: Simd, const RANGED: bool>(simd: S, lights: &[Emitter], tile: &mu
     let er = S::as_mut_simd_f32s(&mut tile.irradiance.x[..used]).0;
     let eg = S::as_mut_simd_f32s(&mut tile.irradiance.y[..used]).0;
     let eb = S::as_mut_simd_f32s(&mut tile.irradiance.z[..used]).0;
-    let zero = simd.splat_f32s(0.0);
+    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
     let pi = simd.splat_f32s(PI);
     let mut lost = 0.0f64;
     let add = |a, b| simd.add_f32s(a, b);
@@ -107,10 +119,14 @@ fn add_block<S: Simd, const RANGED: bool>(simd: S, lights: &[Emitter], tile: &mu
             let mut transfer = simd.select_f32s(simd.greater_than_f32s(denominator, zero), quotient, zero);
             if RANGED {
                 let beyond = simd.greater_than_f32s(r_sq, splat(light.range_sq));
-                let bound = simd.div_f32s(splat(light.bound), r_sq);
-                let arrives = simd.greater_than_f32s(transfer, zero);
-                let bound = simd.select_f32s(arrives, bound, zero);
-                lost_lanes = add(lost_lanes, simd.select_f32s(beyond, bound, zero));
+                if BY_LOT {
+                    transfer = mul(transfer, simd.max_f32s(mul(r_sq, splat(light.weight_slope)), one));
+                } else {
+                    let bound = simd.div_f32s(splat(light.bound), r_sq);
+                    let arrives = simd.greater_than_f32s(transfer, zero);
+                    let bound = simd.select_f32s(arrives, bound, zero);
+                    lost_lanes = add(lost_lanes, simd.select_f32s(beyond, bound, zero));
+                }
                 transfer = simd.select_f32s(beyond, zero, transfer);
             }
             r = add(r, mul(splat(light.flux.x), transfer));
@@ -152,7 +168,8 @@ mod tests {
         }))
         .unwrap();
         for kernel in Kernel::ALL {
-            let culling = Culling { kernel, epsilon: 0.0, albedo_max: 1.0, magnitude: 1.0 };
+            let culling =
+                Culling { kernel, epsilon: 0.0, stochastic: false, albedo_max: 1.0, magnitude: 1.0 };
             for set in [InstructionSet::Detected, InstructionSet::Avx2, InstructionSet::Portable] {
                 let mut tile = Tile::new();
                 tile.fill(1000, |i| {
@@ -170,7 +187,7 @@ mod tests {
                     })
                 });
                 let mut selection = Selection::default();
-                culling.select(&vsls, &tile, &mut selection);
+                culling.select(&vsls, &tile, 0, &mut selection);
                 assert_eq!(accumulate(set, &selection, &mut tile), 0.0);
                 for (i, &(x, n)) in points[..1000].iter().enumerate() {
                     let mut expected = Vec3::ZERO;

@@ -59,7 +59,7 @@ pub(crate) fn accumulate(selection: &Selection, tile: &mut Tile) -> f64 {
             if transfer > 0.0 && r_sq > light.range_sq {
                 skipped += f64::from(light.bound / r_sq);
             } else if transfer > 0.0 {
-                tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * transfer);
+                tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * (transfer * light.weight(r_sq)));
             }
         }
     }
@@ -108,6 +108,7 @@ mod tests {
                             flux: set.flux()[i],
                             area_term: 0.0,
                             range_sq: f32::INFINITY,
+                            weight_slope: 0.0,
                             bound: 0.0,
                         };
                         let d = set.position()[i] - at;

@@ -18,8 +18,8 @@ use photonstream_renderer::{
     FrameRenderer, LayerKind, RenderError, RenderOptions, RenderStats, Rendered, VslSet, Watch, owner,
     shadow_rays::LIGHT_SEED,
 };
-use photonstream_scene::{Scene, Visibility};
-use photonstream_shading::sobol::Sequence;
+use photonstream_scene::{RangeCulling, Scene, Visibility};
+use photonstream_shading::{culling, sobol::Sequence};
 use rayon::prelude::*;
 use std::{sync::atomic::AtomicUsize, time::Instant};
 
@@ -73,7 +73,9 @@ pub fn render_with(
     // Summed in the order of the tiles: the same on any number of threads.
     let (skipped, indirect) =
         tiles.iter().fold((0.0, 0.0), |(s, i), tile| (s + tile.skipped, i + tile.indirect));
+    let variance: f64 = tiles.iter().map(|tile| tile.variance).sum();
     stats.range_loss_share = if skipped > 0.0 { skipped / indirect } else { 0.0 };
+    stats.range_error = RenderStats::range_error(variance, indirect, film.pixel_count());
     stats.vsls = vsls.len() as u64;
     stats.render_ms = start.elapsed().as_secs_f64() * 1e3;
     let mut rendered = Rendered { film, stats };
@@ -119,6 +121,8 @@ struct TileResult {
     stats: RenderStats,
     /// Sum of the upper bounds of what was skipped, in W m⁻² sr⁻¹.
     skipped: f64,
+    /// Sum of the upper bounds of the variance that lots bring, in (W m⁻² sr⁻¹)².
+    variance: f64,
     /// Sum of the indirect radiance, largest channel, in W m⁻² sr⁻¹.
     indirect: f64,
 }
@@ -137,6 +141,7 @@ impl<'a> Frame<'a> {
         let culling = Culling {
             kernel: options.kernel,
             epsilon: options.epsilon,
+            stochastic: options.culling == RangeCulling::Stochastic,
             albedo_max: albedo_max.fold(0.0, f32::max),
             magnitude: if magnitude.is_finite() { magnitude } else { 0.0 },
         };
@@ -169,13 +174,15 @@ impl<'a> Frame<'a> {
         let count = width * height;
         let layers = vec![vec![Vec3::ZERO; count]; self.options.layers.len()];
         let stats = RenderStats::default();
-        let mut result = TileResult { x, y, width, layers, stats, skipped: 0.0, indirect: 0.0 };
+        let mut result =
+            TileResult { x, y, width, layers, stats, skipped: 0.0, variance: 0.0, indirect: 0.0 };
         for sample_index in 0..self.options.samples_per_pixel {
             let pixel_of = |i: usize| (x + (i % width) as u32, y + (i / width) as u32);
             tile.fill(count, |i| self.see(pixel_of(i), sample_index));
             result.stats.camera_rays += count as u64;
             if self.options.needs(LayerKind::needs_indirect) {
-                self.gather(tile, selection, &mut result);
+                let first_lot = culling::first_lot(self.options.seed, sample_index);
+                self.gather(tile, first_lot, selection, &mut result);
             }
             for i in 0..count {
                 if let Some(surface) = &tile.surfaces[i] {
@@ -206,9 +213,10 @@ impl<'a> Frame<'a> {
         surface::first(self.scene, camera.position, direction)
     }
 
-    fn gather(&self, tile: &mut Tile, selection: &mut Selection, result: &mut TileResult) {
-        self.culling.select(self.vsls, tile, selection);
+    fn gather(&self, tile: &mut Tile, first_lot: u32, selection: &mut Selection, result: &mut TileResult) {
+        self.culling.select(self.vsls, tile, first_lot, selection);
         result.skipped += selection.skipped;
+        result.variance += selection.variance;
         match self.options.visibility {
             Visibility::None | Visibility::Ao => {
                 result.skipped += gather::accumulate(self.instructions, selection, tile);

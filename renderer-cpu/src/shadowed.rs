@@ -52,7 +52,8 @@ pub(crate) fn accumulate(
             let direction = target - surface.ray_origin;
             let ray = Ray { origin: surface.ray_origin, direction, t_max: SHADOW_REACH };
             if !scene.bvh.occluded(&ray) {
-                tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * transfer);
+                let arriving = light.flux * (transfer * light.weight(r_sq));
+                tile.irradiance.set(i, tile.irradiance.get(i) + arriving);
             }
         }
     }
@@ -79,7 +80,8 @@ pub(crate) fn accumulate(
                 t_max: SHADOW_REACH,
             };
             if !scene.bvh.occluded(&ray) {
-                tile.irradiance.set(i, tile.irradiance.get(i) + light.flux * seen.transfer);
+                let arriving = light.flux * (seen.transfer * light.weight(r_sq));
+                tile.irradiance.set(i, tile.irradiance.get(i) + arriving);
             }
         }
     }

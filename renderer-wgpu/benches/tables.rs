@@ -9,7 +9,7 @@ use glam::Vec3;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::LayerKind;
 use photonstream_renderer_wgpu::{Accumulation, AdapterChoice, Gpu, PassTime, Renderer, Show, View};
-use photonstream_scene::{Scene, SceneConfig, Visibility};
+use photonstream_scene::{RangeCulling, Scene, SceneConfig, Visibility};
 use photonstream_simulator::{records, simulation::Simulation};
 use std::{path::Path, sync::Arc, time::Instant};
 
@@ -65,6 +65,7 @@ fn view(scene: &Scene, (width, height): (u32, u32)) -> View {
         height,
         visibility: Visibility::None,
         epsilon: 0.0,
+        culling: RangeCulling::Cut,
         ..View::from_settings(&scene.render, &scene.camera)
     }
 }

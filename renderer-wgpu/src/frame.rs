@@ -8,8 +8,7 @@ use crate::{
 };
 use glam::Vec3;
 use photonstream_renderer::LayerKind;
-use photonstream_shading::Camera;
-use photonstream_shading::Kernel;
+use photonstream_shading::{Camera, Kernel, culling};
 
 /// The numbers of `view`.
 pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUniform {
@@ -29,6 +28,7 @@ pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUn
         Shown::Full if view.show == Show::Discs || view.only_light.is_some() => Shown::Direct,
         show => show,
     };
+    let by_lot = view.draws_lots();
     FrameUniform {
         camera: CameraUniform {
             position: position.to_array(),
@@ -56,6 +56,8 @@ pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32) -> FrameUn
         show: show as u32,
         ao_radius: scene.bounds.radius * openness::REACH_SHARE,
         ao_samples: openness::SAMPLES,
+        flux_of_range: if by_lot { culling::flux_of_range(scene.albedo_max, view.epsilon) } else { 0.0 },
+        first_lot: if by_lot { culling::first_lot(view.seed, view.sample) } else { 0 },
         ..FrameUniform::default()
     }
 }

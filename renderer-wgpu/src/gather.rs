@@ -130,8 +130,8 @@ impl Gather {
         Ok(())
     }
 
-    /// Upper bound of the radiance (W m⁻² sr⁻¹, summed over pixels) that skipped lights would have added; waits for
-    /// the device.
+    /// Upper bound of the radiance (W m⁻² sr⁻¹, summed over pixels) that skipped lights would have added, or with stochastic
+    /// culling of the variance of the radiance in units of ε²; waits for the device.
     pub(crate) fn skipped(&self, gpu: &Gpu) -> Result<f64, GpuError> {
         let tallies: Vec<[f32; 2]> = readback::buffer(gpu, &self.tallies)?;
         Ok(tallies.iter().map(|t| f64::from(t[0])).sum())

@@ -142,8 +142,8 @@ shared! {
         tone_map: u32,
         ao_radius: f32,
         ao_samples: u32,
-        pad_0: u32,
-        pad_1: u32,
+        flux_of_range: f32,
+        first_lot: u32,
     }
 
     /// Twin of `Object` in frame.wgsl.

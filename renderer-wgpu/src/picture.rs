@@ -6,7 +6,7 @@ use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
     FrameRenderer, LayerKind, RenderError, RenderOptions, RenderStats, Rendered, Watch,
 };
-use photonstream_scene::{Scene, Visibility};
+use photonstream_scene::{RangeCulling, Scene, Visibility};
 use photonstream_shading::sobol::Sequence;
 use std::time::Instant;
 
@@ -107,6 +107,7 @@ impl WgpuRenderer {
             kernel: options.kernel,
             visibility: options.visibility,
             epsilon: options.epsilon,
+            culling: options.culling,
             light_samples: options.light_samples,
             seed: options.seed,
             accumulation: self.choices.accumulation,
@@ -150,7 +151,7 @@ impl FrameRenderer for WgpuRenderer {
         let mut layers: Vec<Vec<glam::Vec3>> = Vec::new();
         let mut stats = RenderStats { vsls: frame.vsls.len() as u64, ..RenderStats::default() };
         self.passes.clear();
-        let mut indirect_sum = 0.0;
+        let (mut indirect_sum, mut range_sum) = (0.0, 0.0);
         for sample in 0..samples {
             watch.check()?;
             // All pixels share the places of their samples.
@@ -186,7 +187,7 @@ impl FrameRenderer for WgpuRenderer {
                     })?;
                     indirect_sum +=
                         self.renderer.pixels()?.iter().map(|p| f64::from(p.max_element())).sum::<f64>();
-                    stats.range_loss_share += skipped;
+                    range_sum += skipped;
                 }
             }
             watch.report(f64::from(sample + 1) / f64::from(samples));
@@ -198,8 +199,14 @@ impl FrameRenderer for WgpuRenderer {
             }
             film.push(layer.name(), pixels)?;
         }
-        stats.range_loss_share =
-            if stats.range_loss_share > 0.0 { stats.range_loss_share / indirect_sum } else { 0.0 };
+        match options.culling {
+            RangeCulling::Stochastic => {
+                let variance = range_sum * f64::from(options.epsilon).powi(2);
+                stats.range_error = RenderStats::range_error(variance, indirect_sum, film.pixel_count());
+            }
+            RangeCulling::Cut if range_sum > 0.0 => stats.range_loss_share = range_sum / indirect_sum,
+            RangeCulling::Cut => {}
+        }
         self.warn()?;
         let by_rays = options.needs(LayerKind::needs_indirect) && options.visibility == Visibility::Rays;
         stats.noise = if by_rays { self.renderer.noise()? } else { None };

@@ -179,7 +179,8 @@ impl Renderer {
         scene.max(f32::MIN_POSITIVE)
     }
 
-    /// What skipped lights would have added at most, summed over all pixels, in W m⁻² sr⁻¹; waits for the device.
+    /// What skipped lights would have added at most, summed over all pixels, in W m⁻² sr⁻¹, or with stochastic culling the
+    /// greatest variance in units of ε²; waits for the device.
     pub(crate) fn skipped(&self) -> Result<f64, GpuError> {
         self.gather.skipped(&self.gpu)
     }

@@ -39,14 +39,14 @@ sources! {
     GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION];
     SHADOW_MAP = "shadow_map" [];
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
-    UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
-    CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
-    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, VSL, VSL_PATCH];
+    UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
+    CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
+    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH];
     SPLAT = "splat" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, PROJECTION, VSL, VSL_PATCH
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, PROJECTION, VSL, VSL_PATCH
     ];
     FORWARD = "forward" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, FRAME, PROJECTION, VSL, VSL_PATCH
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, PROJECTION, VSL, VSL_PATCH
     ];
     INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];
@@ -58,7 +58,7 @@ sources! {
         wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_INDIRECT = "rays_indirect" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL];
     PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];

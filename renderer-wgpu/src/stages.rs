@@ -2,7 +2,7 @@
 
 use crate::{Accumulation, Shadows, Show, View};
 use photonstream_renderer::LayerKind;
-use photonstream_scene::Visibility;
+use photonstream_scene::{RangeCulling, Visibility};
 use photonstream_shading::{Camera, Kernel};
 
 /// Counts of changes to what is on the device.
@@ -73,6 +73,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
         kernel: Kernel::Paper,
         visibility: Visibility::None,
         epsilon: 0.0,
+        culling: RangeCulling::Cut,
         accumulation: Accumulation::Tiled,
         interleave: 1,
         shadows: Shadows::None,
@@ -87,6 +88,10 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
     let seen = View { camera: view.camera, jitter: view.jitter, ..base };
     let shape = Versions { shape: versions.shape, ..Versions::default() };
     let View { kernel, epsilon, seed, .. } = *view;
+    // Lots are drawn anew for each sample and seed; what has no range does not care for the culling.
+    let lots = view.draws_lots();
+    let culling = if lots { view.culling } else { RangeCulling::Cut };
+    let (lot_sample, lot_seed) = if lots { (view.sample, seed) } else { (0, 0) };
     match stage {
         // New views of lights are told apart by the lights' table.
         Stage::Maps => Key { view: View { width: 0, height: 0, ..base }, versions: shape },
@@ -100,6 +105,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
         Stage::Unpack => {
             let versions =
                 Versions { vsls: versions.vsls, materials: versions.materials, ..Versions::default() };
+            let base = View { culling, sample: lot_sample, seed: lot_seed, ..base };
             Key { view: View { width: 0, height: 0, kernel, epsilon, ..base }, versions }
         }
         Stage::Indirect => {
@@ -113,8 +119,9 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
                 // Lists that the sum itself does not need are made for it alone.
                 show: if view.show == Show::Tiles { Show::Tiles } else { base.show },
                 rays_per_pixel: if rays { view.rays_per_pixel } else { 0 },
-                sample: if rays { view.sample } else { 0 },
-                seed: if rays { seed } else { 0 },
+                culling,
+                sample: if rays { view.sample } else { lot_sample },
+                seed: if rays { seed } else { lot_seed },
                 ..seen
             };
             Key { view, versions: Versions { vsls: versions.vsls, materials: versions.materials, ..shape } }
@@ -160,6 +167,8 @@ mod tests {
         );
         assert_eq!(stale(View { shadows: Shadows::Rays, ..view }, versions), [Direct, Output]);
         assert_eq!(stale(View { kernel: Kernel::Paper, ..view }, versions), [Unpack, Indirect, Output]);
+        let culling = RangeCulling::Cut;
+        assert_eq!(stale(View { culling, ..view }, versions), [Unpack, Indirect, Output]);
         assert_eq!(stale(View { interleave: 2, ..view }, versions), [Indirect, Output]);
         assert_eq!(stale(View { show: Show::Tiles, ..view }, versions), [Indirect, Owners, Output]);
         assert_eq!(stale(view, Versions { vsls: 1, ..versions }), [Unpack, Indirect, Owners, Output]);

@@ -2,7 +2,7 @@
 
 use crate::GpuError;
 use photonstream_renderer::LayerKind;
-use photonstream_scene::{RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::{Camera, Kernel};
 
 macro_rules! named {
@@ -93,8 +93,10 @@ pub struct View {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed, and how.
     pub visibility: Visibility,
-    /// A virtual surface light is skipped where it cannot add this radiance (W m⁻² sr⁻¹); 0: never.
+    /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
+    /// Whether lights beyond their range are skipped or drawn by lot.
+    pub culling: RangeCulling,
     /// How virtual surface lights are summed.
     pub accumulation: Accumulation,
     /// Edge of the pattern of interleaved sampling, with `tiled` only: 1 every pixel sums all lights, 2 or 4 it sums
@@ -114,7 +116,7 @@ pub struct View {
     pub jitter: [f32; 2],
     /// Number of the camera sample, from 0: each has samples of lights of its own.
     pub sample: u32,
-    /// Seed of pixel and area-light samples.
+    /// Seed of pixel and area-light samples, and of the lots of stochastic culling.
     pub seed: u64,
 }
 
@@ -128,6 +130,7 @@ impl View {
             kernel: settings.kernel,
             visibility: settings.visibility,
             epsilon: settings.epsilon,
+            culling: settings.culling,
             accumulation: Accumulation::default(),
             interleave: 1,
             shadows: Shadows::default(),
@@ -165,6 +168,11 @@ impl View {
     /// Whether indirect light is summed by shadow rays; lists of tiles are shown without.
     pub(crate) fn by_rays(&self) -> bool {
         self.visibility == Visibility::Rays && self.show != Show::Tiles
+    }
+
+    /// Whether lights draw their range by lot.
+    pub(crate) fn draws_lots(&self) -> bool {
+        self.epsilon > 0.0 && self.culling == RangeCulling::Stochastic
     }
 
     pub(crate) fn needs_direct(&self) -> bool {

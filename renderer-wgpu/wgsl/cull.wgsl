@@ -53,7 +53,8 @@ struct Batch {
 // Lists of all lights; with interleaved sampling of the far ones, and behind them those of the near ones.
 @group(1) @binding(2) var<storage, read_write> masks: array<u32>;
 // For each word of each tile: upper bound of the radiance that skipped lights would have added, summed over the
-// tile's receivers (W m⁻² sr⁻¹), and number of lights kept; summed over the batches.
+// tile's receivers (W m⁻² sr⁻¹), or of the variance that lots bring in units of ε²; and number of lights kept; summed over
+// the batches.
 @group(1) @binding(3) var<storage, read_write> tallies: array<vec2f>;
 @group(1) @binding(4) var<uniform> numbers: BatchNumbers;
 
@@ -93,13 +94,17 @@ fn select_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
                 continue;
             }
             let bound = flux_max * frame.albedo_max / (PI * PI);
+            let far = max(abs(lo), abs(hi));
+            let by_lot = frame.flux_of_range > 0.0;
+            if by_lot {
+                skipped += culling_greatest_variance(flux_max / frame.flux_of_range, nearest_sq, dot(far, far)) * f32(tile.receivers);
+            }
             if nearest_sq > light.range_sq {
-                skipped += bound / nearest_sq * f32(tile.receivers);
+                skipped += select(bound / nearest_sq * f32(tile.receivers), 0.0, by_lot);
                 continue;
             }
-            let far = max(abs(lo), abs(hi));
             if dot(far, far) > light.range_sq {
-                skipped += bound / light.range_sq * f32(tile.receivers);
+                skipped += select(bound / light.range_sq * f32(tile.receivers), 0.0, by_lot);
             }
             if frame.interleave > 1u && nearest_sq < steep * steep {
                 near_mask |= 1u << bit;

@@ -5,7 +5,7 @@ struct Frame {
     size: vec2u,             // pixels
     tiles: vec2u,            // columns and rows of tiles
     jitter: vec2f,           // place of the sample within its pixel
-    epsilon: f32,            // W m⁻² sr⁻¹; 0: no light is skipped
+    epsilon: f32,            // W m⁻² sr⁻¹; 0: no light has a range
     albedo_max: f32,
     magnitude: f32,          // largest coordinate of the scene in m
     area_factor: f32,        // 1 for the disc kernel, 0 for the point, -1 for polygons
@@ -21,8 +21,8 @@ struct Frame {
     tone_map: u32,
     ao_radius: f32,          // m
     ao_samples: u32,
-    pad_0: u32,
-    pad_1: u32,
+    flux_of_range: f32,      // flux that has a range of 1 m, in W; 0 where no light draws its range by lot
+    first_lot: u32,          // where the lots of the lights begin
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

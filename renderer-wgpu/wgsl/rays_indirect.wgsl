@@ -117,13 +117,14 @@ fn trace_indirect(@builtin(global_invocation_id) id: vec3u) {
     pixels[slot] = state;
 }
 
-// Share of the light's flux that arrives where nothing is between.
+// Share of the light's flux that arrives where nothing is between, times what makes up for lights that are not kept.
 fn transfer(light: Vsl, index: u32, surface: Surface, pixel: vec2u) -> f32 {
     let d = light.position - surface.position;
-    if dot(d, d) > light.range_sq {
+    let kept = vsl_weight(light, dot(d, d));
+    if kept == 0.0 {
         return 0.0;
     }
-    return vsl_transfer(light, index, surface.position, pixel_ray_origin(surface, pixel), surface.normal);
+    return kept * vsl_transfer(light, index, surface.position, pixel_ray_origin(surface, pixel), surface.normal);
 }
 
 // Luminance of what would arrive.

@@ -43,7 +43,10 @@ fn unpack(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gro
             && min(min(flux.x, flux.y), min(flux.z, record.area)) >= 0.0
             && abs(dot(normal, normal) - 1.0) < 1e-4;
         if usable {
-            let range_sq = kernel_range_sq(flux_max, frame.albedo_max, frame.epsilon);
+            var range_sq = kernel_range_sq(flux_max, frame.albedo_max, frame.epsilon);
+            if frame.flux_of_range > 0.0 {
+                range_sq = min(range_sq / culling_lot(index, frame.first_lot), F32_MAX);
+            }
             var area_term = record.area * frame.area_factor;
             if frame.area_factor < 0.0 {
                 area_term = -patch_area(index);

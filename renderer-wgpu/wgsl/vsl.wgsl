@@ -2,7 +2,7 @@
 
 struct Vsl {
     position: vec3f,
-    range_sq: f32,           // beyond this squared distance it is skipped, m²
+    range_sq: f32,           // beyond this squared distance it is skipped, m²: its range, or the one it has drawn
     normal: vec3f,
     area_term: f32,          // what the kernel adds to π r², m²; less than 0: minus the area of its polygon
     flux: vec3f,             // W

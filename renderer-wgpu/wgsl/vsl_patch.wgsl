@@ -34,12 +34,24 @@ fn vsl_transfer(light: Vsl, index: u32, position: vec3f, origin: vec3f, normal: 
     return kernel_transfer(d, normal, light.normal, max(light.area_term, 0.0));
 }
 
+// What a light is multiplied by at a squared distance of `r_sq` m²: 0 beyond its range, within one that it has drawn by lot the
+// inverse of the probability.
+fn vsl_weight(light: Vsl, r_sq: f32) -> f32 {
+    if r_sq > light.range_sq {
+        return 0.0;
+    }
+    return culling_weight(r_sq, max(max(light.flux.x, light.flux.y), light.flux.z), frame.flux_of_range);
+}
+
 // Irradiance in W m⁻² that `light` adds at a surface.
 fn vsl_irradiance(light: Vsl, index: u32, position: vec3f, origin: vec3f, normal: vec3f) -> vec3f {
+    if !RANGED {
+        return light.flux * vsl_transfer(light, index, position, origin, normal);
+    }
     let d = light.position - position;
-    let transfer = vsl_transfer(light, index, position, origin, normal);
-    if RANGED && dot(d, d) > light.range_sq {
+    let kept = vsl_weight(light, dot(d, d));
+    if kept == 0.0 {
         return vec3f(0.0);
     }
-    return light.flux * transfer;
+    return light.flux * (kept * vsl_transfer(light, index, position, origin, normal));
 }

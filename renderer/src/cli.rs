@@ -2,7 +2,7 @@
 
 use crate::{LayerKind, RenderOptions};
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 use std::{path::PathBuf, str::FromStr};
 
@@ -33,6 +33,12 @@ pub struct Args {
     /// Shadows of indirect light: none, rays, or ao with the GPU renderer; the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
+    /// Smallest radiance worth adding, W/(m² sr), which ends the range of a light; 0: no range; the scene's own if not given.
+    #[arg(long, value_name = "L")]
+    pub epsilon: Option<f32>,
+    /// Lights beyond their range: cut (skipped) or stochastic (drawn by lot); the scene's own if not given.
+    #[arg(long, value_name = "C")]
+    pub culling: Option<RangeCulling>,
     /// Layers to render: full, direct, indirect, albedo, normal, vsl, flux, depth.
     #[arg(long, value_name = "LAYER", value_delimiter = ',', default_value = "full")]
     pub show: Vec<LayerKind>,
@@ -79,6 +85,8 @@ impl Args {
             height: self.size.map_or(defaults.height, |s| s.height),
             kernel: self.kernel.unwrap_or(defaults.kernel),
             visibility: self.visibility.unwrap_or(defaults.visibility),
+            epsilon: self.epsilon.unwrap_or(defaults.epsilon),
+            culling: self.culling.unwrap_or(defaults.culling),
             layers: self.show.clone(),
             samples_per_pixel: self.samples,
             threads: self.threads,
@@ -104,11 +112,12 @@ mod tests {
         let args = Command::try_parse_from(["r"]).unwrap().args;
         assert_eq!(args.options(&settings), RenderOptions::from_settings(&settings));
         let line = "r --channel a-1 --out x --headless --frames 3 --size 64x48 --kernel paper --visibility none \
-                    --show full,normal --samples 4 --threads 2 --first 12";
+                    --epsilon 0.5 --culling cut --show full,normal --samples 4 --threads 2 --first 12";
         let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
         let options = args.options(&settings);
         assert_eq!((options.width, options.height, options.samples_per_pixel), (64, 48, 4));
         assert_eq!((options.kernel, options.visibility), (Kernel::Paper, Visibility::None));
+        assert_eq!((options.epsilon, options.culling), (0.5, RangeCulling::Cut));
         assert_eq!(options.layers, [LayerKind::Full, LayerKind::Normal]);
         assert_eq!((args.frames, args.first, options.threads), (Some(3), 12, Some(2)));
     }
@@ -119,6 +128,7 @@ mod tests {
             ("r --size 800", "such as 800x600"),
             ("r --size 0x5", "such as 800x600"),
             ("r --kernel box", "paper, disc, patch"),
+            ("r --culling some", "cut, stochastic"),
             ("r --show ful", "full, direct, indirect"),
             ("r --frames 0", "0 is not in 1.."),
             ("r --first 0", "0 is not in 1.."),

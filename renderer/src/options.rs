@@ -1,7 +1,7 @@
 //! Gathers what a picture of virtual surface lights shall be like.
 
 use crate::{LayerKind, RenderError};
-use photonstream_scene::{RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 
 /// What a picture of virtual surface lights shall be like.
@@ -15,15 +15,17 @@ pub struct RenderOptions {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed.
     pub visibility: Visibility,
-    /// A virtual surface light is skipped where it cannot add this radiance (W m⁻² sr⁻¹); 0: never.
+    /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
+    /// Whether lights beyond their range are skipped or drawn by lot.
+    pub culling: RangeCulling,
     /// Shadow rays per camera sample and area light.
     pub light_samples: u32,
     /// What is rendered, in this order; the first is what a viewer shows.
     pub layers: Vec<LayerKind>,
     /// Camera samples per pixel: 1 is the pixel's centre, more are stratified over it.
     pub samples_per_pixel: u32,
-    /// Seed of pixel and area-light samples.
+    /// Seed of pixel and area-light samples, and of the lots of stochastic culling.
     pub seed: u64,
     /// Threads; `None`: one per core. The picture does not depend on it.
     pub threads: Option<usize>,
@@ -38,6 +40,7 @@ impl RenderOptions {
             kernel: settings.kernel,
             visibility: settings.visibility,
             epsilon: settings.epsilon,
+            culling: settings.culling,
             light_samples: settings.light_samples,
             layers: vec![LayerKind::Full],
             samples_per_pixel: 1,

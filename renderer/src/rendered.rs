@@ -30,14 +30,23 @@ pub struct RenderStats {
     pub vsls: u64,
     /// What the range of the lights may have lost at most, as a share of the indirect light of the picture: the sum
     /// of the upper bounds of all that was skipped over the sum of what was found. 0 where nothing was skipped, infinite
-    /// (`null` in JSON) where nothing was found.
+    /// (`null` in JSON) where nothing was found, 0 with stochastic culling: nothing is lost on average.
     pub range_loss_share: f64,
+    /// Upper bound of the standard error that lots of stochastic culling add to the indirect light, as rel. RMSE: that of
+    /// independent lots, without cosines. 0 without lots, infinite (`null` in JSON) where nothing was found.
+    pub range_error: f64,
     /// Standard error of the indirect light as rel. RMSE, where shadow rays went to some of the virtual surface lights
     /// only; `None` where nothing was drawn by lot.
     pub noise: Option<f64>,
 }
 
 impl RenderStats {
+    /// [`RenderStats::range_error`] of a picture of `pixels`: `variance` is the sum over camera samples of the greatest variance
+    /// of their radiance in (W m⁻² sr⁻¹)², `indirect` that of the indirect radiance, in the largest channel.
+    pub fn range_error(variance: f64, indirect: f64, pixels: usize) -> f64 {
+        if variance > 0.0 { (variance * pixels as f64).sqrt() / indirect } else { 0.0 }
+    }
+
     /// The rays of both; the rest is that of `self`.
     #[must_use]
     pub fn merge(mut self, other: &Self) -> Self {

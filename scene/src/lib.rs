@@ -26,4 +26,4 @@ pub use error::{Place, SceneError};
 pub use features::Features;
 pub use import::AssetRoots;
 pub use scene::{Geometry, LightId, Material, MaterialId, Object, ObjectId, Scene, SceneLight, Side, Sides};
-pub use settings::{RenderSettings, Sampling, StreamingSettings, Visibility};
+pub use settings::{RangeCulling, RenderSettings, Sampling, StreamingSettings, Visibility};

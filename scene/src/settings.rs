@@ -29,6 +29,16 @@ pub enum Visibility {
     Rays,
 }
 
+/// What becomes of a virtual surface light beyond its range, where it cannot add `epsilon` to any radiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum RangeCulling {
+    /// It is skipped, and what it would have added is lost: paper A.
+    Cut,
+    /// It is kept by lot, more rarely the farther away, and adds the more: nothing is lost on average.
+    #[default]
+    Stochastic,
+}
+
 /// Settings of the simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamingSettings {
@@ -95,8 +105,10 @@ pub struct RenderSettings {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed.
     pub visibility: Visibility,
-    /// A virtual surface light is skipped where it cannot add this radiance (W m⁻² sr⁻¹); 0: never.
+    /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
+    /// Whether lights beyond their range are skipped or drawn by lot.
+    pub culling: RangeCulling,
     /// Shadow rays per pixel and area light.
     pub light_samples: u32,
     /// Exposure of tone-mapped pictures, in stops.
@@ -113,6 +125,7 @@ impl Default for RenderSettings {
             kernel: Kernel::Patch,
             visibility: Visibility::Rays,
             epsilon: 1e-6,
+            culling: RangeCulling::default(),
             light_samples: 16,
             exposure_ev: 0.0,
             tone_map: ToneMap::Aces,
@@ -160,4 +173,5 @@ named!(
 named!(Interpolation, "interpolation", Linear = "linear", Smooth = "smooth", Step = "step");
 named!(Repeat, "repeat", Loop = "loop", Bounce = "bounce", Once = "once");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
+named!(RangeCulling, "culling", Cut = "cut", Stochastic = "stochastic");
 named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays");

@@ -211,6 +211,11 @@ fn numbers_outside_their_domain_are_refused() {
         ),
         ("vsls = 100", "[render]\nwidth_px = 0", ":23:12: render.width_px: found 0, expected a whole number"),
         ("vsls = 100", "[render]\nepsilon = -1", ":23:11: render.epsilon: found -1, expected a radiance"),
+        (
+            "vsls = 100",
+            "[render]\nculling = \"some\"",
+            ":23:11: render.culling: unknown culling \"some\"; expected one of: cut, stochastic",
+        ),
         ("vsls = 100", "[render]\nexposure_ev = 99", ":23:15: render.exposure_ev: found 99, expected stops"),
         (
             "outer_half_angle_deg = 30",

@@ -7,6 +7,7 @@
 
 pub mod basis;
 pub mod camera;
+pub mod culling;
 pub mod kernel;
 pub mod light;
 pub mod octahedral;

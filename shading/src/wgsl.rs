@@ -11,6 +11,8 @@ use std::fmt::Write;
 pub const KERNEL: &str = include_str!("../wgsl/kernel.wgsl");
 /// Twin of [`crate::camera`].
 pub const CAMERA: &str = include_str!("../wgsl/camera.wgsl");
+/// Twin of [`crate::culling`].
+pub const CULLING: &str = include_str!("../wgsl/culling.wgsl");
 /// Twin of [`crate::light`]: what arrives, not what is emitted.
 pub const LIGHT: &str = include_str!("../wgsl/light.wgsl");
 /// Twin of [`crate::octahedral`].
@@ -23,9 +25,10 @@ pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 7] = [
+pub const TWINS: [(&str, &str); 8] = [
     ("kernel", KERNEL),
     ("camera", CAMERA),
+    ("culling", CULLING),
     ("light", LIGHT),
     ("octahedral", OCTAHEDRAL),
     ("patch", PATCH),

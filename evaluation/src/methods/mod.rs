@@ -18,7 +18,7 @@ use photonstream_renderer_cpu::{
     reference::{PixelFilter, Stop},
     render,
 };
-use photonstream_scene::{Scene, Visibility};
+use photonstream_scene::{RangeCulling, Scene, Visibility};
 use photonstream_shading::Kernel;
 use photonstream_simulator::simulation::Simulation;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -157,6 +157,9 @@ impl Bench {
             Method::InstantRadiosityBounded => (Kernel::Disc, point.visibility),
             _ => (point.kernel, point.visibility),
         };
+        if point.method == Method::PaperA {
+            options.culling = RangeCulling::Cut;
+        }
         options
     }
 

@@ -35,7 +35,8 @@ Examples:
 
 JSON: { \"scene\", \"scene_hash\", \"pictures\": [paths], \"frame\", \"vsls\", \"photon_paths\", \"rays_per_s\", \"converged\",
   \"simulation_ms\": time the simulation had run, \"first_picture_s\", \"render_ms\", \"total_s\", \"width_px\",
-  \"height_px\", \"range_loss_share\": what the lights' range may have lost at most, as a share of the indirect light }")]
+  \"height_px\", \"range_loss_share\": what the lights' range may have lost at most, as a share of the indirect light,
+  \"range_error\": what lights drawn by lot may add to its error at most, as rel. RMSE }")]
 pub(crate) struct Args {
     /// Scene to simulate and render
     #[arg(required_unless_present = "channel", conflicts_with = "channel")]
@@ -81,6 +82,7 @@ pub(crate) struct Report {
     width_px: u32,
     height_px: u32,
     range_loss_share: f64,
+    range_error: f64,
 }
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
@@ -223,6 +225,7 @@ fn picture(
         width_px: made.film.width(),
         height_px: made.film.height(),
         range_loss_share: made.stats.range_loss_share,
+        range_error: made.stats.range_error,
     })
 }
 

@@ -5,7 +5,7 @@ use crate::scenes::{NO_LIGHT, cornell, floor, on_floor, options, scattered_vsls}
 use glam::Vec3;
 use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet, Watch};
 use photonstream_renderer_cpu::{InstructionSet, render, render_with};
-use photonstream_scene::Visibility;
+use photonstream_scene::{RangeCulling, Visibility};
 use photonstream_shading::Kernel;
 use std::f64::consts::PI;
 
@@ -123,10 +123,11 @@ fn sides_are_separate() {
 fn instruction_sets_and_threads_give_the_same_picture() {
     let scene = cornell();
     let vsls = scattered_vsls(&scene, 300);
-    for epsilon in [0.0, 1e-3] {
+    let (cut, by_lot) = (RangeCulling::Cut, RangeCulling::Stochastic);
+    for (epsilon, culling) in [(0.0, cut), (1e-3, cut), (1e-3, by_lot)] {
         for kernel in Kernel::ALL {
             let mut options = options(101, 67, &[LayerKind::Indirect]);
-            (options.epsilon, options.kernel) = (epsilon, kernel);
+            (options.epsilon, options.culling, options.kernel) = (epsilon, culling, kernel);
             let render = |options: &RenderOptions, set| {
                 render_with(&scene, &vsls, options, Watch::default(), set).unwrap()
             };
@@ -137,13 +138,15 @@ fn instruction_sets_and_threads_give_the_same_picture() {
                 let (a, b) = (other.stats.range_loss_share, best.stats.range_loss_share);
                 // The lanes' bounds are summed in another order.
                 assert!((a - b).abs() <= 1e-5 * a, "{a} against {b}");
-                assert_eq!(a > 0.0, epsilon > 0.0);
+                assert_eq!(a > 0.0, epsilon > 0.0 && culling == cut);
+                assert_eq!(other.stats.range_error > 0.0, culling == by_lot);
             }
             for threads in [1, 2, 3] {
                 options.threads = Some(threads);
                 let other = render(&options, InstructionSet::Detected);
                 assert_eq!(other.film, best.film, "{threads} threads");
                 assert_eq!(other.stats.range_loss_share, best.stats.range_loss_share);
+                assert_eq!(other.stats.range_error, best.stats.range_error);
             }
         }
     }
@@ -157,7 +160,7 @@ fn the_loss_of_the_range_is_bounded_by_its_report() {
     let vsls = scattered_vsls(&scene, 200);
     for visibility in [Visibility::None, Visibility::Rays] {
         let mut options = options(60, 45, &[LayerKind::Indirect]);
-        options.visibility = visibility;
+        (options.visibility, options.culling) = (visibility, RangeCulling::Cut);
         let whole = render(&scene, &vsls, &options, Watch::default()).unwrap();
         assert_eq!(whole.stats.range_loss_share, 0.0);
         let total = |film: &photonstream_film::Film| -> f64 {

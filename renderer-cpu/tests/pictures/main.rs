@@ -1,6 +1,7 @@
 //! Tests of the CPU renderer and the reference through their public interface.
 
 mod attach;
+mod culling;
 mod gather;
 mod options_and_layers;
 mod reference_closed_forms;

@@ -11,8 +11,8 @@ use crate::{
 };
 use glam::Vec2;
 use photonstream_renderer::{LayerKind, RenderOptions, Vsl, VslSet};
-use photonstream_scene::{RenderSettings, Scene, SceneConfig, Side, Visibility, bvh::Ray};
-use photonstream_shading::{Camera, Kernel, kernel, octahedral, sampling, sobol::Sequence, surface};
+use photonstream_scene::{RangeCulling, RenderSettings, Scene, SceneConfig, Side, Visibility, bvh::Ray};
+use photonstream_shading::{Camera, Kernel, culling, kernel, octahedral, sampling, sobol::Sequence, surface};
 use std::path::Path;
 use wgpu::{BufferUsages, TextureUsages};
 
@@ -108,9 +108,15 @@ impl Picture {
     fn indirect(&mut self, vsls: &VslSet, epsilon: f32, budget: u32, sample: u32) -> (Vec<Vec3>, Traced) {
         let mut lights: Vec<VslUniform> = (0..vsls.len())
             .filter_map(|i| vsls.get(i))
-            .map(|v| VslUniform {
+            .zip(0..)
+            .map(|(v, index)| VslUniform {
                 position: v.position.to_array(),
-                range_sq: kernel::range_sq(v.flux.max_element(), self.frame.albedo_max, epsilon),
+                range_sq: kernel::range_sq(v.flux.max_element(), self.frame.albedo_max, epsilon)
+                    / if self.frame.flux_of_range > 0.0 {
+                        culling::lot(index, self.frame.first_lot)
+                    } else {
+                        1.0
+                    },
                 normal: v.normal.to_array(),
                 area_term: v.area,
                 flux: v.flux.to_array(),
@@ -189,6 +195,9 @@ fn scattered_vsls(scene: &Scene, count: usize) -> VslSet {
     VslSet::new(vsls).unwrap()
 }
 
+/// Without a range.
+const WHOLE: (f32, RangeCulling) = (0.0, RangeCulling::Cut);
+
 /// The CPU renderer's irradiance where a surface reflects and does not shine itself, else `None`.
 fn expected(
     scene: &Scene,
@@ -196,7 +205,7 @@ fn expected(
     size: [u32; 2],
     layer: LayerKind,
     light_samples: u32,
-    epsilon: f32,
+    (epsilon, culling): (f32, RangeCulling),
 ) -> Vec<Option<Vec3>> {
     let options = RenderOptions {
         width: size[0],
@@ -204,6 +213,7 @@ fn expected(
         kernel: Kernel::Disc,
         visibility: Visibility::Rays,
         epsilon,
+        culling,
         light_samples,
         layers: vec![layer, LayerKind::Albedo],
         ..RenderOptions::from_settings(&RenderSettings::default())

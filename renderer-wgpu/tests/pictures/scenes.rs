@@ -95,6 +95,8 @@ impl Lit {
             kernel: view.kernel,
             visibility: view.visibility,
             epsilon: view.epsilon,
+            culling: view.culling,
+            seed: view.seed,
             light_samples: view.light_samples,
             layers: layers.to_vec(),
             ..RenderOptions::from_settings(&self.scene.render)

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use photonstream_renderer_wgpu::{Gpu, test_gpu};
 use photonstream_shading::{
-    Camera, Kernel, LightShape, octahedral, sampling,
+    Camera, Kernel, LightShape, culling, octahedral, sampling,
     sobol::Sequence,
     tone::{self, ToneMap},
     wgsl,
@@ -198,6 +198,39 @@ fn octahedral_normals() {
     let body = "let n = octahedral_decode(vec2f(x[3], x[4])); y = array<f32, 4>(n.x, n.y, n.z, 0.0);";
     check("octahedral_decode", &[wgsl::OCTAHEDRAL], body, 0.0, &inputs, |x| {
         out(octahedral::decode(Vec2::new(x[3], x[4])), 0.0)
+    });
+}
+
+/// Lots are the same bit for bit, N = 4 096 indices and beginnings as halves of 16 bits, and beginnings of all ones, zeros and
+/// each length between; what depends on the distance within 1e-6, a few roundings.
+#[test]
+fn lots() {
+    let mut inputs: Vec<_> = uniform()
+        .iter()
+        .map(|x| {
+            let mut y = *x;
+            (0..4).for_each(|i| y[i] = (x[i] * 65_536.0).floor());
+            (y[4], y[5], y[6]) = (x[4] * 10.0, x[5] * 30.0, if x[6] < 0.2 { 0.0 } else { x[6] * 1e-2 });
+            (y[7], y[8]) = (x[7] * 5.0, x[7] * 5.0 + x[8] * 10.0);
+            y
+        })
+        .collect();
+    for (bit, x) in (0..=32u32).zip(&mut inputs) {
+        let first = u32::MAX.checked_shr(bit).unwrap_or(0);
+        x[..4].copy_from_slice(&[(first >> 16) as f32, (first & 0xffff) as f32, 0.0, 0.0]);
+    }
+    let Some(gpu) = test_gpu::gpu() else { return };
+    let body = "let first = u32(x[0]) << 16u | u32(x[1]);
+        y[0] = culling_lot(u32(x[2]) << 16u | u32(x[3]), first);";
+    let found = on_device(&gpu, &[wgsl::CULLING], body, &inputs);
+    let whole = |high: f32, low: f32| (high as u32) << 16 | low as u32;
+    for (found, x) in found.iter().zip(&inputs) {
+        let expected = culling::lot(whole(x[2], x[3]), whole(x[0], x[1]));
+        assert_eq!(found[0].to_bits(), expected.to_bits(), "{x:?}: {} against {expected}", found[0]);
+    }
+    let body = "y[0] = culling_weight(x[4], x[5], x[6]); y[1] = culling_greatest_variance(x[4], x[7], x[8]);";
+    check("culling_weight", &[wgsl::CULLING], body, 1e-6, &inputs, |x| {
+        [culling::weight(x[4], x[5], x[6]), culling::greatest_variance(x[4], x[7], x[8]), 0.0, 0.0]
     });
 }
 

@@ -27,6 +27,8 @@ impl Choices {
         let mut view = View::from_settings(settings, camera);
         view.kernel = args.kernel.unwrap_or(view.kernel);
         view.visibility = args.visibility.unwrap_or(view.visibility);
+        view.epsilon = args.epsilon.unwrap_or(view.epsilon);
+        view.culling = args.culling.unwrap_or(view.culling);
         let gpu = args.gpu.choices();
         (view.accumulation, view.interleave) = (gpu.accumulation, gpu.interleave);
         (view.shadows, view.rays_per_pixel) = (gpu.shadows, gpu.rays_per_pixel);

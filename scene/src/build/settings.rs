@@ -81,6 +81,7 @@ pub(super) fn render(config: &mut RenderConfig, field: &Field<'_>) -> Result<Ren
             .key("epsilon")
             .number(epsilon, "a radiance from 0 to 1e6 W/(m² sr)", |x| (0.0..=1e6).contains(&x))?
             as f32,
+        culling: *config.culling.get_or_insert(d.culling),
         light_samples: field.key("light_samples").count(light_samples, 1..=4096)?,
         exposure_ev: field.key("exposure_ev").number(exposure_ev, "stops within ±32", |x| x.abs() <= 32.0)?
             as f32,

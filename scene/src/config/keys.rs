@@ -89,6 +89,7 @@ fn every_key() -> SceneConfig {
             kernel: Some(Kernel::Paper),
             visibility: Some(Visibility::None),
             epsilon: Some(1.0),
+            culling: Some(RangeCulling::Cut),
             light_samples: Some(1),
             exposure_ev: Some(1.0),
             tone_map: Some(ToneMap::Linear),

@@ -15,7 +15,7 @@ pub use values::{OneOrThree, Vector};
 
 use crate::{
     scene::Sides,
-    settings::{Sampling, Visibility},
+    settings::{RangeCulling, Sampling, Visibility},
 };
 use photonstream_shading::{Kernel, tone::ToneMap};
 use serde::{Deserialize, Serialize};
@@ -279,6 +279,9 @@ pub struct RenderConfig {
     pub visibility: Option<Visibility>,
     /// Smallest radiance worth adding, W m⁻² sr⁻¹.
     pub epsilon: Option<f64>,
+    /// Whether lights beyond their range are skipped or drawn by lot.
+    #[serde(default, with = "values::by_name")]
+    pub culling: Option<RangeCulling>,
     /// Shadow rays per pixel and area light.
     pub light_samples: Option<u32>,
     /// Exposure of tone-mapped pictures, in stops.

@@ -126,6 +126,7 @@ impl_named!(
     super::Interpolation,
     super::Repeat,
     crate::scene::Sides,
+    crate::settings::RangeCulling,
     crate::settings::Sampling,
     crate::settings::Visibility,
     photonstream_shading::Kernel,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photonstream_renderer::{LayerKind, RenderOptions, Rendered, VslSet, Watch};
 use photonstream_renderer_cpu::render;
-use photonstream_scene::{Scene, SceneConfig, SceneError, Visibility};
+use photonstream_scene::{RangeCulling, Scene, SceneConfig, SceneError, Visibility};
 use photonstream_shading::Kernel;
 use photonstream_simulator::{
     counters::Counters, flux::QUANTUM, ledger::Ledger, records, simulation::Simulation,
@@ -92,7 +92,8 @@ impl Lit {
         epsilon: f32,
     ) -> Rendered {
         let scene = &self.simulation.scene;
-        let options = RenderOptions { kernel, visibility, epsilon, ..options(scene, size) };
+        let culling = RangeCulling::Cut;
+        let options = RenderOptions { kernel, visibility, epsilon, culling, ..options(scene, size) };
         let rendered = render(scene, &self.vsls(), &options, Watch::default()).unwrap();
         rendered.film.check_finite().unwrap();
         for layer in rendered.film.layers() {

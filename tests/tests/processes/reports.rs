@@ -62,7 +62,7 @@ fn json_reports_have_their_documented_keys() {
         &render,
         &keys(
             "scene scene_hash pictures frame vsls photon_paths rays_per_s converged simulation_ms first_picture_s \
-             render_ms total_s width_px height_px range_loss_share",
+             render_ms total_s width_px height_px range_loss_share range_error",
         ),
     );
     assert_eq!((&render["vsls"], &render["converged"]), (&60.into(), &true.into()));

@@ -20,7 +20,7 @@ fn direct_light_is_that_of_the_cpu() {
         let (found, _) = Picture::new(&gpu, &scene, SIZE).direct(&scene, samples);
         let error = relative_rmse(
             &found,
-            &expected(&scene, &VslSet::default(), SIZE, LayerKind::Direct, samples, 0.0),
+            &expected(&scene, &VslSet::default(), SIZE, LayerKind::Direct, samples, WHOLE),
         );
         assert!(error <= TOLERANCE, "{name}: {error:e}");
     }
@@ -64,15 +64,23 @@ fn every_kind_of_light_arrives_as_on_the_cpu() {
         "#,
     );
     let (found, _) = Picture::new(&gpu, &scene, SIZE).direct(&scene, 4);
-    let error = relative_rmse(&found, &expected(&scene, &VslSet::default(), SIZE, LayerKind::Direct, 4, 0.0));
+    let error =
+        relative_rmse(&found, &expected(&scene, &VslSet::default(), SIZE, LayerKind::Direct, 4, WHOLE));
     assert!(error <= TOLERANCE, "{error:e}");
 }
 
-/// N = 300 lights, without and with ranges that leave some out.
+/// N = 300 lights, without ranges, with ranges that leave some out, and with those that they have drawn by lot.
 #[test]
 fn indirect_light_with_a_ray_to_each_is_that_of_the_cpu() {
     let Some(gpu) = gpu() else { return };
-    for (name, epsilon) in [("cornell-box.toml", 0.0), ("cornell-box.toml", 2e-4), ("two-rooms.toml", 0.0)] {
+    let by_lot = (2e-4, RangeCulling::Stochastic);
+    for (name, range) in [
+        ("cornell-box.toml", WHOLE),
+        ("cornell-box.toml", (2e-4, RangeCulling::Cut)),
+        ("cornell-box.toml", by_lot),
+        ("two-rooms.toml", WHOLE),
+    ] {
+        let epsilon = range.0;
         let scene = config(name);
         let vsls = scattered_vsls(&scene, 300);
         let mut picture = Picture::new(&gpu, &scene, SIZE);
@@ -81,11 +89,15 @@ fn indirect_light_with_a_ray_to_each_is_that_of_the_cpu() {
             .iter()
             .map(|o| scene.materials[o.material.0 as usize].albedo.max_element())
             .fold(0.0, f32::max);
-        let reference = expected(&scene, &vsls, SIZE, LayerKind::Indirect, 1, epsilon);
+        if range == by_lot {
+            picture.frame.flux_of_range = culling::flux_of_range(picture.frame.albedo_max, epsilon);
+            picture.frame.first_lot = culling::first_lot(1, 0);
+        }
+        let reference = expected(&scene, &vsls, SIZE, LayerKind::Indirect, 1, range);
         for budget in [0, 300, 4_000] {
             let (found, _) = picture.indirect(&vsls, epsilon, budget, 0);
             let error = relative_rmse(&found, &reference);
-            assert!(error <= TOLERANCE, "{name}, {epsilon}: {error:e}");
+            assert!(error <= TOLERANCE, "{name}, {range:?}: {error:e}");
             assert_eq!(picture.rays.noise(&gpu).unwrap(), Some(0.0));
         }
     }
