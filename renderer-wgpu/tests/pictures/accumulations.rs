@@ -71,8 +71,9 @@ fn the_reported_loss_bounds_the_loss() {
 }
 
 /// Lights drawn by lot are those of the CPU: every accumulation and rays to every light, relative RMSE ≤ 1e-3, and both report
-/// no loss. The GPU bounds the error closer, by tiles of 16 pixels and without lights that all of a tile faces away from, but not to less than 0.4 of the bound. 48 × 40 pixels, 400 lights, ε = 2e-3, where the lots change the picture by more than 0.01. The
-/// same options twice give the same bits.
+/// no loss. The GPU bounds the error closer, by tiles of 16 pixels and without lights that all of a tile faces away from, but not
+/// by a fifth. 48 × 40 pixels, 400 lights, ε = 1e-2, where the lots change the picture by more than 0.01. The same options twice
+/// give the same bits.
 #[test]
 fn lots_are_the_cpus() {
     let lit = scenes::cornell(LAMPS[0].1, "vsls = 400\npool_paths = 4096");
@@ -84,7 +85,7 @@ fn lots_are_the_cpus() {
             let options = RenderOptions {
                 width: 48,
                 height: 40,
-                epsilon: 2e-3,
+                epsilon: 1e-2,
                 culling: RangeCulling::Stochastic,
                 visibility,
                 layers: vec![LayerKind::Indirect, LayerKind::Normal, LayerKind::Albedo],
@@ -108,7 +109,7 @@ fn lots_are_the_cpus() {
                 "{accumulation}, {visibility:?}: lots {lots:.3}, stated {stated:.3}, on the CPU {on_cpu:.3}"
             );
             assert!(lots > 0.01 && stated > 0.0, "{lots}, stated {stated}");
-            assert!(stated <= on_cpu * 1.001 && stated > 0.4 * on_cpu, "{stated}, on the CPU {on_cpu}");
+            assert!(stated <= on_cpu * 1.001 && stated > 0.8 * on_cpu, "{stated}, on the CPU {on_cpu}");
             assert_eq!((found.stats.range_loss_share, whole.stats.range_error), (0.0, 0.0));
         }
     }
