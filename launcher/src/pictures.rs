@@ -8,6 +8,7 @@ use photonstream_renderer::{
 };
 use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
+use photonstream_simulator::cli::{MapEdge, Overrides};
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -23,7 +24,7 @@ pub(crate) struct Look {
     /// How a light's flux falls off: `patch` (near ones as polygons), `disc` (bounded) or `paper` (1/πr²) [default: as the scene says]
     #[arg(long)]
     pub(crate) kernel: Option<Kernel>,
-    /// Shadows of indirect light: `rays`, `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
+    /// Shadows of indirect light: `rays`, `octahedral` (distance maps that the simulator traces), `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
     #[arg(long)]
     pub(crate) visibility: Option<Visibility>,
     /// Smallest radiance worth adding, in W/(m² sr): where a light's range ends, 0 never [default: as the scene says]
@@ -49,6 +50,15 @@ impl Look {
         add("epsilon", self.epsilon.map(|e| e.to_string()));
         add("culling", self.culling.map(|c| c.name().to_owned()));
         arguments
+    }
+
+    /// `overrides`, with what the simulator has to publish for the visibility asked for.
+    pub(crate) fn overrides(&self, overrides: &Overrides) -> Overrides {
+        let mut overrides = overrides.clone();
+        if self.visibility == Some(Visibility::Octahedral) {
+            overrides.distance_map_px.get_or_insert(MapEdge::Auto);
+        }
+        overrides
     }
 
     fn options(&self, settings: &RenderSettings, layers: &[LayerKind]) -> RenderOptions {

@@ -40,6 +40,7 @@ fn main() {
 fn publisher(runtime: &Runtime, count: usize) -> Publisher {
     let spec = SegmentSpec {
         vsl_capacity: count as u32,
+        distance_capacity: 0,
         object_capacity: 16,
         light_capacity: 4,
         scene_text_capacity: 4096,
@@ -56,6 +57,8 @@ fn publish(publisher: &mut Publisher, vsls: &[VslRecord], changed: &ChunkSet) {
         changed: Some(changed),
         patches: &[],
         patches_changed: None,
+        distances: &[],
+        distances_changed: None,
         objects: &[],
         lights: &[],
         statistics: &StatisticsRecord::default(),

@@ -28,6 +28,7 @@ impl Channel {
         let (runtime, name) = (Runtime::at(root.path()), ChannelName::default());
         let spec = SegmentSpec {
             vsl_capacity: count as u32,
+            distance_capacity: 0,
             object_capacity: 16,
             light_capacity: 4,
             scene_text_capacity: 4096,
@@ -46,6 +47,8 @@ impl Channel {
             changed,
             patches: &[],
             patches_changed: None,
+            distances: &[],
+            distances_changed: None,
             objects: &[],
             lights: &[],
             statistics: &self.statistics,

@@ -96,7 +96,7 @@ pub(crate) fn all_finite(kind: ArrayKind, words: &[u64]) -> bool {
         ArrayKind::Object => OBJECT.all_finite::<16>(words),
         ArrayKind::Light => LIGHT.all_finite::<16>(words),
         ArrayKind::Statistics => STATISTICS.all_finite::<32>(words),
-        ArrayKind::SceneText | ArrayKind::Notice => true,
+        ArrayKind::SceneText | ArrayKind::Notice | ArrayKind::Distance => true,
         ArrayKind::Patch => PATCH.all_finite::<13>(words),
     }
 }
@@ -111,7 +111,7 @@ pub(crate) fn load(kind: ArrayKind, from: &[AtomicU64], into: &mut [u64]) -> boo
         ArrayKind::Object => OBJECT.load::<16>(from, into),
         ArrayKind::Light => LIGHT.load::<16>(from, into),
         ArrayKind::Statistics => STATISTICS.load::<32>(from, into),
-        ArrayKind::SceneText | ArrayKind::Notice => TEXT.load::<8>(from, into),
+        ArrayKind::SceneText | ArrayKind::Notice | ArrayKind::Distance => TEXT.load::<8>(from, into),
         ArrayKind::Patch => PATCH.load::<13>(from, into),
     }
 }

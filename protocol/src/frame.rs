@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::chunks::{CHUNK_RECORDS, ChunkSet};
 use crate::error::ProtocolError;
-use crate::record::{ArrayKind, LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord};
+use crate::record::{
+    ArrayKind, DistanceRecord, LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord,
+};
 use crate::ring_read::Head;
 use crate::shape::head;
 use crate::staging::{ArrayView, Patch, Staging};
@@ -41,6 +43,10 @@ pub struct VslFrame {
     pub patches: Vec<PatchRecord>,
     /// Frame in which each chunk of [`CHUNK_RECORDS`] patches last changed.
     pub patch_chunk_frames: Vec<u64>,
+    /// Pieces of the distance maps of the virtual surface lights: as many for each light, or none at all.
+    pub distances: Vec<DistanceRecord>,
+    /// Frame in which each chunk of [`CHUNK_RECORDS`] pieces last changed.
+    pub distance_chunk_frames: Vec<u64>,
     /// What is wrong with the simulation, empty while nothing is; the same allocation for as long as it stays the same.
     pub notice: Arc<str>,
 }
@@ -50,6 +56,7 @@ const VSL: usize = 0;
 const TEXT: usize = 4;
 const NOTICE: usize = 5;
 const PATCH: usize = 6;
+const DISTANCE: usize = 7;
 /// Words of a chunk of lights.
 const CHUNK_WORDS: usize = CHUNK_RECORDS * size_of::<VslRecord>() / 8;
 
@@ -69,6 +76,7 @@ impl Buffer {
             2 => self.frame.lights.resize_with(records, LightRecord::default),
             TEXT | NOTICE => self.texts[a - TEXT].resize(records, [0; 8]),
             PATCH => self.frame.patches.resize_with(records, PatchRecord::default),
+            DISTANCE => self.frame.distances.resize_with(records, DistanceRecord::default),
             _ => {}
         }
         self.versions[a].resize(records.div_ceil(CHUNK_RECORDS), 0);
@@ -83,6 +91,7 @@ impl Buffer {
                 bytemuck::cast_slice(&std::slice::from_ref(&self.frame.statistics)[..self.versions[a].len()])
             }
             PATCH => bytemuck::cast_slice(&self.frame.patches),
+            DISTANCE => bytemuck::cast_slice(&self.frame.distances),
             _ => self.texts[a - TEXT].as_flattened(),
         }
     }
@@ -98,6 +107,7 @@ impl Buffer {
                 bytemuck::cast_slice_mut(&mut std::slice::from_mut(&mut self.frame.statistics)[..records])
             }
             PATCH => bytemuck::cast_slice_mut(&mut self.frame.patches),
+            DISTANCE => bytemuck::cast_slice_mut(&mut self.frame.distances),
             _ => self.texts[a - TEXT].as_flattened_mut(),
         };
         (words, versions)
@@ -185,6 +195,7 @@ impl FramePair {
         }
         back.frame.chunk_frames.clone_from(&back.versions[VSL]);
         back.frame.patch_chunk_frames.clone_from(&back.versions[PATCH]);
+        back.frame.distance_chunk_frames.clone_from(&back.versions[DISTANCE]);
         let frame = &mut back.frame;
         frame.scene_text = text;
         frame.notice = notice;

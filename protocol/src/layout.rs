@@ -12,7 +12,7 @@ use crate::text::TEXT_RECORD;
 /// First eight bytes of every segment.
 pub const MAGIC: [u8; 8] = *b"PHOTONS1";
 /// Major version: another one cannot be read.
-pub const ABI_MAJOR: u64 = 3;
+pub const ABI_MAJOR: u64 = 4;
 /// Minor version: a greater one adds arrays that older readers skip.
 pub const ABI_MINOR: u64 = 0;
 /// Bytes of UTF-8 a notice may have, unless there is a reason for another number.
@@ -25,7 +25,7 @@ const PAGE: usize = 4096;
 /// Alignment of tables and arrays, in bytes.
 const LINE: usize = 64;
 /// Greatest number of arrays of a segment.
-pub(crate) const MAX_ARRAYS: usize = 8;
+pub(crate) const MAX_ARRAYS: usize = 16;
 /// Words of one entry of the array table.
 pub(crate) const ENTRY_WORDS: usize = 6;
 /// Greatest segment, in bytes.
@@ -81,6 +81,8 @@ pub(crate) mod state {
 pub struct SegmentSpec {
     /// Greatest number of virtual surface lights, and of their patches.
     pub vsl_capacity: u32,
+    /// Greatest number of pieces of distance maps; 0 where there are none.
+    pub distance_capacity: u32,
     /// Greatest number of objects.
     pub object_capacity: u32,
     /// Greatest number of lights.
@@ -121,6 +123,7 @@ impl Layout {
         }
         for (field, found) in [
             ("vsl_capacity", spec.vsl_capacity),
+            ("distance_capacity", spec.distance_capacity),
             ("object_capacity", spec.object_capacity),
             ("light_capacity", spec.light_capacity),
             ("scene_text_capacity", spec.scene_text_capacity),
@@ -134,6 +137,7 @@ impl Layout {
         let mut arrays = ArrayKind::ALL.map(|kind| {
             let capacity = match kind {
                 ArrayKind::Vsl | ArrayKind::Patch => spec.vsl_capacity as usize,
+                ArrayKind::Distance => spec.distance_capacity as usize,
                 ArrayKind::Object => spec.object_capacity as usize,
                 ArrayKind::Light => spec.light_capacity as usize,
                 ArrayKind::Statistics => 1,

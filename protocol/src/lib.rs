@@ -50,8 +50,8 @@ pub use process::monotonic_ns;
 pub use publisher::{FrameSource, Publisher};
 pub use reader_segment::AccessMode;
 pub use record::{
-    ArrayKind, Field, FieldType, LAYOUT_HASH, LightRecord, ObjectRecord, PATCH_CORNERS, PatchRecord,
-    StatisticsRecord, VslRecord,
+    ArrayKind, DISTANCE_TEXELS, DistanceRecord, Field, FieldType, LAYOUT_HASH, LightRecord, ObjectRecord,
+    PATCH_CORNERS, PatchRecord, StatisticsRecord, VslRecord,
 };
 pub use runtime::{ChannelName, Runtime};
 pub use subscriber::{Liveness, Reading, Subscriber, Wake};

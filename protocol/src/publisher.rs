@@ -9,7 +9,7 @@ use crate::error::ProtocolError;
 use crate::heartbeat::Heartbeat;
 use crate::layout::{ABI_MAJOR, Layout, SegmentSpec, state};
 use crate::process::{Identity, monotonic_ns};
-use crate::record::{LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord};
+use crate::record::{DistanceRecord, LightRecord, ObjectRecord, PatchRecord, StatisticsRecord, VslRecord};
 use crate::ring_write::{ArraySource, Changed, FrameHead, RingWriter};
 use crate::runtime::{ChannelDir, ChannelName, Current, Runtime};
 use crate::text::{PublishedText, fitted};
@@ -27,6 +27,10 @@ pub struct FrameSource<'a> {
     pub patches: &'a [PatchRecord],
     /// Chunks of `patches` that differ from the frame published last, as `changed` says it of `vsls`.
     pub patches_changed: Option<&'a ChunkSet>,
+    /// Pieces of the distance maps of `vsls`: as many for each light, or none at all.
+    pub distances: &'a [DistanceRecord],
+    /// Chunks of `distances` that differ from the frame published last, as `changed` says it of `vsls`.
+    pub distances_changed: Option<&'a ChunkSet>,
     /// Objects.
     pub objects: &'a [ObjectRecord],
     /// Lights.
@@ -181,6 +185,11 @@ impl Publisher {
                 bytemuck::cast_slice(frame.patches),
                 false,
                 frame.patches_changed.map_or(Changed::Compare, Changed::Chunks),
+            ),
+            array(
+                bytemuck::cast_slice(frame.distances),
+                false,
+                frame.distances_changed.map_or(Changed::Compare, Changed::Chunks),
             ),
         ];
         let head = FrameHead {

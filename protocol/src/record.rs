@@ -116,6 +116,17 @@ record! {
     }
 }
 
+/// Texels of a [`DistanceRecord`].
+pub const DISTANCE_TEXELS: usize = 32;
+
+record! {
+    /// A piece of the distance map of a virtual surface light: what it sees around itself, 32 texels of it.
+    DistanceRecord, 64 {
+        /// Two texels a word, the first in its lower half, row by row; see `photonstream_shading::distance_map`.
+        texels: [u32; DISTANCE_TEXELS / 2],
+    }
+}
+
 record! {
     /// What an object is now: its place and size in the world, and what it reflects.
     ObjectRecord, 128 {
@@ -127,7 +138,7 @@ record! {
         /// and the origin, column by column. The axes are orthogonal, as long as the object has grown since it was loaded,
         /// and left-handed where it has been mirrored.
         world_from_object: [f64; 12],
-        /// Bits, none assigned in ABI 3: zero.
+        /// Bits, none assigned in ABI 4: zero.
         flags: u32,
         /// Reflectance, linear RGB in [0, 1]; that of all objects of a material.
         albedo: [f32; 3],
@@ -230,7 +241,7 @@ record! {
     }
 }
 
-/// What the seven arrays of a slot hold; the number is the array's kind in the header.
+/// What the eight arrays of a slot hold; the number is the array's kind in the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum ArrayKind {
@@ -248,12 +259,22 @@ pub enum ArrayKind {
     Notice = 6,
     /// `PatchRecord`s: one for each virtual surface light, or none at all.
     Patch = 7,
+    /// `DistanceRecord`s: edge²/32 for each virtual surface light, one light's after the other's, or none at all.
+    Distance = 8,
 }
 
 impl ArrayKind {
     /// All arrays, in the order in which they lie in a slot.
-    pub const ALL: [Self; 7] =
-        [Self::Vsl, Self::Object, Self::Light, Self::Statistics, Self::SceneText, Self::Notice, Self::Patch];
+    pub const ALL: [Self; 8] = [
+        Self::Vsl,
+        Self::Object,
+        Self::Light,
+        Self::Statistics,
+        Self::SceneText,
+        Self::Notice,
+        Self::Patch,
+        Self::Distance,
+    ];
 
     /// Name in messages and in the documentation.
     pub const fn name(self) -> &'static str {
@@ -265,6 +286,7 @@ impl ArrayKind {
             Self::SceneText => "scene_text",
             Self::Notice => "notice",
             Self::Patch => "patch",
+            Self::Distance => "distance",
         }
     }
 
@@ -277,6 +299,7 @@ impl ArrayKind {
             Self::Statistics => size_of::<StatisticsRecord>(),
             Self::SceneText | Self::Notice => TEXT_RECORD,
             Self::Patch => size_of::<PatchRecord>(),
+            Self::Distance => size_of::<DistanceRecord>(),
         }
     }
 
@@ -289,6 +312,7 @@ impl ArrayKind {
             Self::Statistics => StatisticsRecord::FIELDS,
             Self::SceneText | Self::Notice => &[],
             Self::Patch => PatchRecord::FIELDS,
+            Self::Distance => DistanceRecord::FIELDS,
         }
     }
 }
@@ -353,7 +377,7 @@ mod tests {
 
     /// A changed value here is a changed ABI: renderers of another release refuse it.
     #[test]
-    fn layout_hash_is_the_one_of_abi_3() {
-        assert_eq!(LAYOUT_HASH, 0x426a_26a9_4e8a_c067, "{LAYOUT_HASH:#018x}");
+    fn layout_hash_is_the_one_of_abi_4() {
+        assert_eq!(LAYOUT_HASH, 0xd3ab_f08f_03b1_0ab2, "{LAYOUT_HASH:#018x}");
     }
 }

@@ -3,7 +3,7 @@
 use crate::record::ArrayKind;
 
 /// Words of a slot's head.
-pub(crate) const HEAD_WORDS: usize = 16;
+pub(crate) const HEAD_WORDS: usize = 24;
 
 /// Places within a slot's head, in words.
 pub(crate) mod head {

@@ -33,7 +33,7 @@ impl FrameWords {
             frame.notice.len() as u64,
         ];
         let statistics = std::slice::from_ref(&frame.statistics);
-        let [vsls, objects, lights, counters, text, notice, patches] = &mut self.arrays;
+        let [vsls, objects, lights, counters, text, notice, patches, distances] = &mut self.arrays;
         copy(vsls, &frame.vsls);
         copy(objects, &frame.objects);
         copy(lights, &frame.lights);
@@ -41,6 +41,7 @@ impl FrameWords {
         copy_text(text, &frame.scene_text);
         copy_text(notice, &frame.notice);
         copy(patches, &frame.patches);
+        copy(distances, &frame.distances);
     }
 
     /// Appends what differs from `previous` to `out`: the head, and of each array its number of records, its changed
@@ -104,13 +105,15 @@ impl FrameWords {
     /// Makes `frame` what these words say; texts that stay the same stay the same allocation.
     pub(crate) fn write_to(&self, frame: &mut VslFrame) -> Result<(), String> {
         let [epoch, number, publish_time_ns, simulation_time, config_generation, scene_hash, ..] = self.head;
-        let [vsls, objects, lights, counters, text, notice, patches] = &self.arrays;
+        let [vsls, objects, lights, counters, text, notice, patches, distances] = &self.arrays;
         frame.vsls = records(vsls);
         frame.chunk_frames.clear();
         frame.chunk_frames.extend(frame.vsls.iter().step_by(CHUNK_RECORDS).map(|vsl| vsl.changed_frame));
         frame.patches = records(patches);
         // Nothing is known of when they changed.
         frame.patch_chunk_frames.clear();
+        frame.distances = records(distances);
+        frame.distance_chunk_frames.clear();
         frame.objects = records(objects);
         frame.lights = records(lights);
         frame.statistics = records(counters).first().copied().ok_or("no statistics")?;

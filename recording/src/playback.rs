@@ -46,6 +46,7 @@ impl Playback {
         let present = self.publisher.spec();
         let fits = needed.scene_hash == present.scene_hash
             && needed.vsl_capacity <= present.vsl_capacity
+            && needed.distance_capacity <= present.distance_capacity
             && needed.object_capacity <= present.object_capacity
             && needed.light_capacity <= present.light_capacity
             && needed.scene_text_capacity <= present.scene_text_capacity
@@ -67,6 +68,8 @@ impl Playback {
             changed: None,
             patches: &frame.patches,
             patches_changed: None,
+            distances: &frame.distances,
+            distances_changed: None,
             objects: &frame.objects,
             lights: &frame.lights,
             statistics: &StatisticsRecord { edit_received_ns, traced_ns, ..*s },
@@ -88,6 +91,7 @@ fn spec(frame: &VslFrame) -> SegmentSpec {
     let capacity = |count: usize| u32::try_from(count.max(1)).unwrap_or(u32::MAX);
     SegmentSpec {
         vsl_capacity: capacity(frame.vsls.len().max(frame.patches.len())),
+        distance_capacity: u32::try_from(frame.distances.len()).unwrap_or(u32::MAX),
         object_capacity: capacity(frame.objects.len()),
         light_capacity: capacity(frame.lights.len()),
         scene_text_capacity: capacity(frame.scene_text.len()),

@@ -16,6 +16,8 @@ pub(crate) struct Emitter {
     /// The negated normal: cos θ_s is its product with the vector *to* the light.
     pub(crate) inverse_normal: Vec3,
     pub(crate) flux: Vec3,
+    /// Its number.
+    pub(crate) index: u32,
     /// What the kernel adds to π r², in m².
     pub(crate) area_term: f32,
     /// Beyond this squared distance the light is skipped: its range, or the one it has drawn.
@@ -105,6 +107,7 @@ impl Culling {
                 position,
                 inverse_normal: -normal,
                 flux,
+                index: index as u32,
                 area_term: self.kernel.area_term(vsls.area()[index]),
                 range_sq,
                 weight_slope: culling::weight_slope(flux_max, flux_of_range),

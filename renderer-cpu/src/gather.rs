@@ -27,26 +27,29 @@ const BLOCK: usize = 256;
 /// Adds the irradiance of the selected lights to `tile`. Returns the sum over lanes of the upper bounds of what was
 /// skipped, in W m⁻² sr⁻¹.
 pub(crate) fn accumulate(set: InstructionSet, selection: &Selection, tile: &mut Tile) -> f64 {
-    let gather =
-        Gather { near: &selection.near, partial: &selection.partial, by_lot: selection.by_lot, tile };
+    on(set, Gather { near: &selection.near, partial: &selection.partial, by_lot: selection.by_lot, tile })
+}
+
+/// Runs `work` with an instruction set.
+pub(crate) fn on<W: WithSimd>(set: InstructionSet, work: W) -> W::Output {
     match set {
-        InstructionSet::Detected => pulp::Arch::new().dispatch(gather),
-        InstructionSet::Avx2 => avx2(gather),
-        InstructionSet::Portable => pulp::Scalar128b.vectorize(gather),
+        InstructionSet::Detected => pulp::Arch::new().dispatch(work),
+        InstructionSet::Avx2 => avx2(work),
+        InstructionSet::Portable => pulp::Scalar128b.vectorize(work),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn avx2(gather: Gather<'_>) -> f64 {
+fn avx2<W: WithSimd>(work: W) -> W::Output {
     match pulp::x86::V3::try_new() {
-        Some(simd) => Simd::vectorize(simd, gather),
-        None => pulp::Scalar128b.vectorize(gather),
+        Some(simd) => Simd::vectorize(simd, work),
+        None => pulp::Scalar128b.vectorize(work),
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn avx2(gather: Gather<'_>) -> f64 {
-    pulp::Scalar128b.vectorize(gather)
+fn avx2<W: WithSimd>(work: W) -> W::Output {
+    pulp::Scalar128b.vectorize(work)
 }
 
 struct Gather<'a> {

@@ -8,6 +8,8 @@
 mod cull;
 mod direct;
 mod gather;
+mod lanes;
+mod mapped;
 mod owner;
 mod patched;
 pub mod reference;

@@ -106,6 +106,7 @@ mod tests {
                             position: set.position()[i],
                             inverse_normal: -set.normal()[i],
                             flux: set.flux()[i],
+                            index: i as u32,
                             area_term: 0.0,
                             range_sq: f32::INFINITY,
                             weight_slope: 0.0,

@@ -3,7 +3,7 @@
 use crate::{
     InstructionSet,
     cull::{Culling, Selection},
-    direct, gather,
+    direct, gather, mapped,
     owner::Owners,
     patched, shadowed,
     surface::{self, Surface},
@@ -53,8 +53,12 @@ pub fn render_with(
     let start = Instant::now();
     options.validate()?;
     if options.visibility == Visibility::Ao {
-        let expected = "none or rays here; ao needs the G-buffer of --renderer wgpu";
+        let expected = "none, rays or octahedral here; ao needs the G-buffer of --renderer wgpu";
         return Err(RenderError::Option { option: "visibility", found: "ao".into(), expected });
+    }
+    let needs_maps = options.visibility == Visibility::Octahedral && options.needs(LayerKind::needs_indirect);
+    if needs_maps && vsls.map_edge() == 0 && !vsls.is_empty() {
+        return Err(RenderError::NoDistanceMaps);
     }
     let mut film = Film::new(options.width, options.height)?;
     let frame = Frame::new(scene, vsls, options, instructions);
@@ -95,6 +99,7 @@ impl FrameRenderer for CpuRenderer {
         options: &RenderOptions,
         watch: Watch<'_>,
     ) -> Result<Rendered, RenderError> {
+        options.check_distance_maps(frame)?;
         let mut rendered = render(scene, &VslSet::from_frame(frame)?, options, watch)?;
         rendered.describe(scene, Some(frame), options);
         Ok(rendered)
@@ -221,6 +226,9 @@ impl<'a> Frame<'a> {
             Visibility::None | Visibility::Ao => {
                 result.skipped += gather::accumulate(self.instructions, selection, tile);
                 result.skipped += patched::accumulate(selection, tile);
+            }
+            Visibility::Octahedral => {
+                result.skipped += mapped::accumulate(self.instructions, self.vsls, selection, tile)
             }
             Visibility::Rays => {
                 let shadowed = shadowed::accumulate(self.scene, &self.culling, selection, tile);

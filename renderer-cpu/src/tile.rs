@@ -102,4 +102,4 @@ impl Tile {
 }
 
 /// Lanes of the widest instruction set.
-const MAX_LANES: usize = 16;
+pub(crate) const MAX_LANES: usize = 16;

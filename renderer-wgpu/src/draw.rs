@@ -89,7 +89,7 @@ impl Renderer {
         if !self.done.is_stale(Stage::Output, view, self.versions) {
             return Ok(Drawn::default());
         }
-        let frame = frame_uniform(view, scene, self.vsls.count);
+        let frame = frame_uniform(view, scene, self.vsls.count, self.vsls.maps.edge);
         if frame != self.frame {
             self.gpu.queue.write_buffer(&self.frame_buffer, 0, bytemuck::bytes_of(&frame));
             self.frame = frame;
@@ -184,6 +184,7 @@ impl Renderer {
                     interleave,
                     listed,
                     patches: view.kernel == Kernel::Patch,
+                    mapped: view.visibility == Visibility::Octahedral && self.vsls.maps.edge > 0,
                 };
                 self.gather.encode(&mut scope, targets, &scene.geometry, &self.vsls, gathering, sees)?;
             }

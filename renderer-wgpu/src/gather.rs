@@ -24,6 +24,7 @@ struct Variant {
     continues: bool,
     interleaved: bool,
     patches: bool,
+    mapped: bool,
 }
 
 /// How the lights of a picture are gathered.
@@ -38,6 +39,8 @@ pub(crate) struct Gathering {
     pub(crate) listed: bool,
     /// Whether near lights are polygons.
     pub(crate) patches: bool,
+    /// Whether lights are shadowed by their distance maps.
+    pub(crate) mapped: bool,
 }
 
 /// The passes that sum virtual surface lights.
@@ -159,7 +162,7 @@ impl Gather {
     }
 
     fn prepare(&mut self, gpu: &Gpu, gathering: Gathering) -> Result<(), GpuError> {
-        let Gathering { accumulation, ranged, interleave, patches, .. } = gathering;
+        let Gathering { accumulation, ranged, interleave, patches, mapped, .. } = gathering;
         if accumulation != Accumulation::Tiled
             && !gpu.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE)
         {
@@ -171,7 +174,8 @@ impl Gather {
             });
         }
         for continues in [false, true] {
-            let variant = Variant { accumulation, ranged, continues, interleaved: interleave > 1, patches };
+            let variant =
+                Variant { accumulation, ranged, continues, interleaved: interleave > 1, patches, mapped };
             self.pipelines.entry(variant).or_insert_with(|| pipeline(gpu, variant));
         }
         if interleave > 1 && self.join.is_none() {
@@ -249,6 +253,7 @@ impl Gather {
                 continues: !first,
                 interleaved,
                 patches: gathering.patches,
+                mapped: gathering.mapped,
             };
             let pipeline = &self.pipelines[&variant];
             let (to, from) = turn(targets, writes - 1 - batch);
@@ -268,6 +273,7 @@ impl Gather {
                 None,
                 lights.numbers(batch),
                 whole(&lights.patches),
+                whole(&lights.maps.texels),
             ];
             let edge = Edge { span: shading, first, last };
             match near.filter(|_| interleaved) {
@@ -301,9 +307,9 @@ impl Gather {
         gathering: Gathering,
         sees: impl Fn(Vec3, f32) -> bool,
     ) {
-        let Gathering { accumulation, ranged, patches, .. } = gathering;
-        let pipeline =
-            &self.pipelines[&Variant { accumulation, ranged, continues: false, interleaved: false, patches }];
+        let Gathering { accumulation, ranged, patches, mapped, .. } = gathering;
+        let pipeline = &self.pipelines
+            [&Variant { accumulation, ranged, continues: false, interleaved: false, patches, mapped }];
         let forward = accumulation == Accumulation::Forward;
         let batches = lights.batches();
         let span = scope.timer.span("indirect light");
@@ -311,10 +317,23 @@ impl Gather {
             let (offset, bytes) = lights.batch(batch);
             let block = part(&lights.lights, offset, bytes);
             let resources = if forward {
-                vec![whole(scope.frame), block, lights.numbers(batch), whole(&lights.patches)]
+                vec![
+                    whole(scope.frame),
+                    block,
+                    lights.numbers(batch),
+                    whole(&lights.patches),
+                    whole(&lights.maps.texels),
+                ]
             } else {
                 let gbuffer = texture(&targets.gbuffer.view);
-                vec![whole(scope.frame), gbuffer, block, lights.numbers(batch), whole(&lights.patches)]
+                vec![
+                    whole(scope.frame),
+                    gbuffer,
+                    block,
+                    lights.numbers(batch),
+                    whole(&lights.patches),
+                    whole(&lights.maps.texels),
+                ]
             };
             let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
             let load = if batch == 0 { LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { LoadOp::Load };
@@ -346,10 +365,11 @@ fn turn(targets: &Targets, more: u32) -> (&wgpu::TextureView, &wgpu::TextureView
 fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
     let ranged = ("RANGED", f64::from(variant.ranged));
     let patches = ("PATCHES", f64::from(variant.patches));
+    let mapped = ("MAPPED", f64::from(variant.mapped));
     let additive = Drawing { fragment: Some("add"), format: Some(HDR), additive: true, ..Drawing::default() };
     match variant.accumulation {
         Accumulation::Tiled => {
-            let constants = [ranged, patches, ("CONTINUES", f64::from(variant.continues))];
+            let constants = [ranged, patches, mapped, ("CONTINUES", f64::from(variant.continues))];
             let entry = if variant.interleaved { "gather_interleaved" } else { "gather" };
             let set = Drawing {
                 vertex: "cover",
@@ -362,7 +382,7 @@ fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
             pipelines::drawing(gpu, &shader::TILED, &set)
         }
         Accumulation::Splat => {
-            let constants = [ranged, patches];
+            let constants = [ranged, patches, mapped];
             // The far sides, once each, wherever the eye is.
             let set = Drawing {
                 vertex: "sphere",
@@ -373,7 +393,7 @@ fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
             pipelines::drawing(gpu, &shader::SPLAT, &set)
         }
         Accumulation::Forward => {
-            let constants = [ranged, patches];
+            let constants = [ranged, patches, mapped];
             let set = Drawing {
                 vertex: "corner",
                 constants: &constants,

@@ -144,6 +144,10 @@ shared! {
         ao_samples: u32,
         flux_of_range: f32,
         first_lot: u32,
+        map_edge: u32,
+        pad_0: u32,
+        pad_1: u32,
+        pad_2: u32,
     }
 
     /// Twin of `Object` in frame.wgsl.

@@ -12,6 +12,7 @@ mod gpu;
 #[cfg(all(feature = "import", unix))]
 mod import;
 mod layout;
+mod map_buffer;
 mod openness;
 mod owners;
 mod picture;

@@ -146,6 +146,7 @@ impl FrameRenderer for WgpuRenderer {
         let mut film = Film::new(options.width, options.height)?;
         self.renderer.set_scene(scene)?;
         self.renderer.set_frame(frame)?;
+        options.check_distance_maps(frame)?;
         let view = self.view(scene, options);
         let samples = options.samples_per_pixel;
         let mut layers: Vec<Vec<glam::Vec3>> = Vec::new();

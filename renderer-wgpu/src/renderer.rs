@@ -147,7 +147,8 @@ impl Renderer {
     /// [`GpuError::TooLarge`].
     pub fn set_frame(&mut self, frame: &VslFrame) -> Result<Upload, GpuError> {
         let upload = self.vsls.update(&self.gpu, frame)?;
-        self.versions.vsls += u64::from(upload.complete || upload.records > 0 || upload.patches > 0);
+        self.versions.vsls +=
+            u64::from(upload.complete || upload.records > 0 || upload.patches > 0 || upload.distances > 0);
         Ok(upload)
     }
 

@@ -14,6 +14,7 @@ const FRAME: &str = include_str!("../wgsl/frame.wgsl");
 const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
 const VSL_PATCH: &str = include_str!("../wgsl/vsl_patch.wgsl");
+const VSL_MAP: &str = include_str!("../wgsl/vsl_map.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
 const SHADOW_NAMED: &str = include_str!("../wgsl/shadow_named.wgsl");
@@ -41,12 +42,14 @@ sources! {
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
-    TILED = "tiled" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH];
+    TILED = "tiled" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, VSL, VSL_PATCH, VSL_MAP
+    ];
     SPLAT = "splat" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, PROJECTION, VSL, VSL_PATCH
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP
     ];
     FORWARD = "forward" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, PROJECTION, VSL, VSL_PATCH
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP
     ];
     INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];

@@ -115,7 +115,11 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
                 epsilon,
                 accumulation: view.accumulation,
                 interleave: view.interleave,
-                visibility: if rays { Visibility::Rays } else { Visibility::None },
+                visibility: match view.visibility {
+                    Visibility::Octahedral => Visibility::Octahedral,
+                    _ if rays => Visibility::Rays,
+                    _ => Visibility::None,
+                },
                 // Lists that the sum itself does not need are made for it alone.
                 show: if view.show == Show::Tiles { Show::Tiles } else { base.show },
                 rays_per_pixel: if rays { view.rays_per_pixel } else { 0 },

@@ -4,12 +4,13 @@ use crate::{
     Gpu, GpuError,
     geometry::buffer,
     layout::{BATCH_LIGHTS, BatchNumbers, VslUniform},
+    map_buffer::MapBuffer,
     pipelines::{self, groups_of_64, whole},
     readback,
     scope::Scope,
     shader,
 };
-use photonstream_protocol::{PatchRecord, VslFrame, VslRecord};
+use photonstream_protocol::{DistanceRecord, PatchRecord, VslFrame, VslRecord};
 use std::ops::Range;
 use wgpu::BufferUsages;
 
@@ -22,6 +23,8 @@ pub struct Upload {
     pub bytes: u64,
     /// Polygons sent.
     pub patches: u64,
+    /// Pieces of distance maps sent.
+    pub distances: u64,
     /// Whether all records were sent, because their number or the segment changed.
     pub complete: bool,
 }
@@ -40,6 +43,8 @@ pub(crate) struct VslBuffer {
     patch_records: Vec<PatchRecord>,
     /// Whether the records came to the device without their polygons.
     pub(crate) lacks_patches: bool,
+    /// What the lights see around themselves.
+    pub(crate) maps: MapBuffer,
     /// [`BatchNumbers`] of each batch, [`NUMBERS_STRIDE`] apart.
     numbers: wgpu::Buffer,
     /// Where changed records lie before the device puts each in its place.
@@ -57,6 +62,8 @@ pub(crate) struct VslBuffer {
 const NUMBERS_STRIDE: u64 = 256;
 /// Bytes of a polygon's record.
 const PATCH_BYTES: u64 = size_of::<PatchRecord>() as u64;
+/// Bytes of a piece of a distance map.
+const DISTANCE_BYTES: u64 = size_of::<DistanceRecord>() as u64;
 /// Bytes of a record.
 const RECORD_BYTES: u64 = size_of::<VslRecord>() as u64;
 /// Records between two that may have changed apart.
@@ -72,6 +79,7 @@ impl VslBuffer {
             patches: buffer(gpu, "patches", PATCH_BYTES, BufferUsages::STORAGE),
             patch_records: Vec::new(),
             lacks_patches: false,
+            maps: MapBuffer::new(gpu),
             numbers: buffer(gpu, "batches", NUMBERS_STRIDE, BufferUsages::UNIFORM),
             staging: None,
             pending: Vec::new(),
@@ -127,6 +135,7 @@ impl VslBuffer {
         let count = frame.vsls.len() as u32;
         self.reserve(gpu, count)?;
         let newer_patches = self.update_patches(gpu, frame)?;
+        let distances = self.maps.update(gpu, frame)?;
         self.lacks_patches = false;
         let follows = self.seen.is_some_and(|(epoch, last)| epoch == frame.epoch && last <= frame.frame);
         let complete = !follows || self.count != count;
@@ -151,8 +160,9 @@ impl VslBuffer {
             }
             upload.records = self.send(gpu, &frame.vsls, &runs);
         }
-        upload.bytes = upload.records * RECORD_BYTES + newer_patches * PATCH_BYTES;
-        upload.patches = newer_patches;
+        upload.bytes =
+            upload.records * RECORD_BYTES + newer_patches * PATCH_BYTES + distances * DISTANCE_BYTES;
+        (upload.patches, upload.distances) = (newer_patches, distances);
         Ok(upload)
     }
 
@@ -252,6 +262,7 @@ impl VslBuffer {
         gpu.queue.submit([encoder.finish()]);
         self.set_count(gpu, count);
         (self.seen, self.mirror, self.lacks_patches) = (None, None, true);
+        self.maps.edge = 0;
         Ok(())
     }
 

@@ -7,6 +7,7 @@ struct Batch {
 @group(0) @binding(1) var<uniform> batch: Batch;
 @group(0) @binding(2) var<uniform> numbers: BatchNumbers;
 @group(0) @binding(3) var<storage, read> patches: array<PatchRecord>;
+@group(0) @binding(4) var<storage, read> distance_maps: array<u32>;
 
 struct Corner {
     // The same bits as in gbuffer.wgsl: only what is seen passes the test for equal depth.
@@ -27,5 +28,5 @@ fn add(in: Corner) -> @location(0) vec4f {
     let position = frame.camera.position + direction * plane_distance(in.anchor, in.normal, direction);
     let normal = select(-in.normal, in.normal, dot(in.normal, direction) < 0.0);
     let origin = position + (normal - direction) * (frame.magnitude * RELATIVE_OFFSET);
-    return vec4f(vsl_irradiance(batch.lights[in.light], numbers.first + in.light, position, origin, normal), 0.0);
+    return vec4f(vsl_arriving(batch.lights[in.light], numbers.first + in.light, position, origin, normal), 0.0);
 }

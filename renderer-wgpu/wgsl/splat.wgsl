@@ -8,6 +8,7 @@ struct Batch {
 @group(0) @binding(2) var<uniform> batch: Batch;
 @group(0) @binding(3) var<uniform> numbers: BatchNumbers;
 @group(0) @binding(4) var<storage, read> patches: array<PatchRecord>;
+@group(0) @binding(5) var<storage, read> distance_maps: array<u32>;
 
 struct Corner {
     @builtin(position) clip: vec4f,
@@ -42,5 +43,5 @@ fn add(in: Corner) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let surface = surface_unpack(word, pixel);
-    return vec4f(vsl_irradiance(batch.lights[in.light], numbers.first + in.light, surface.position, pixel_ray_origin(surface, pixel), surface.normal), 0.0);
+    return vec4f(vsl_arriving(batch.lights[in.light], numbers.first + in.light, surface.position, pixel_ray_origin(surface, pixel), surface.normal), 0.0);
 }

@@ -11,6 +11,7 @@ struct Batch {
 @group(0) @binding(5) var before_near: texture_2d<f32>;
 @group(0) @binding(6) var<uniform> numbers: BatchNumbers;
 @group(0) @binding(7) var<storage, read> patches: array<PatchRecord>;
+@group(0) @binding(8) var<storage, read> distance_maps: array<u32>;
 
 // Whether there is irradiance of earlier batches to add to.
 override CONTINUES: bool = false;
@@ -67,7 +68,7 @@ fn gather_interleaved(@builtin(position) at: vec4f) -> Parts {
                 bits &= bits - 1u;
                 let light = batch.lights[i * 32u + bit];
                 // What overflows would be no number once its share is taken.
-                let added = min(vsl_irradiance(light, numbers.first + i * 32u + bit, surface.position, origin, surface.normal), vec3f(1e37));
+                let added = min(vsl_arriving(light, numbers.first + i * 32u + bit, surface.position, origin, surface.normal), vec3f(1e37));
                 let share_far = smoothstep(0.5 * steep, steep, distance(light.position, surface.position));
                 near += added * (1.0 - share_far);
                 far += added * select(0.0, share_far, ((place >> bit) & 1u) == 1u);
@@ -90,7 +91,7 @@ fn sum_of_list(surface: Surface, origin: vec3f, first: u32, kept: u32) -> vec3f 
         while bits != 0u {
             let place = i * 32u + firstTrailingBit(bits);
             bits &= bits - 1u;
-            sum += vsl_irradiance(batch.lights[place], numbers.first + place, surface.position, origin, surface.normal);
+            sum += vsl_arriving(batch.lights[place], numbers.first + place, surface.position, origin, surface.normal);
         }
     }
     return sum;

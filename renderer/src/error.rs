@@ -23,6 +23,12 @@ pub enum RenderError {
         /// What is possible.
         expected: &'static str,
     },
+    /// Visibility `octahedral` needs distance maps, and the simulation publishes none.
+    #[error(
+        "visibility: found octahedral, but the simulation publishes no distance maps; set streaming.distance_map_px = 32 in \
+         the config, or start the simulator with --distance-map-px auto"
+    )]
+    NoDistanceMaps,
     /// A virtual surface light is unusable.
     #[error(
         "virtual surface light {index}: {field}: found {found}, expected {expected}; simulator and renderer differ, \

@@ -22,5 +22,5 @@ pub use error::RenderError;
 pub use layer::LayerKind;
 pub use options::RenderOptions;
 pub use rendered::{FrameRenderer, RenderStats, Rendered, SOFTWARE};
-pub use vsl::{Patch, Vsl, VslSet};
+pub use vsl::{Patch, Vsl, VslSet, distance_map_edge};
 pub use watch::Watch;

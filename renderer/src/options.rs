@@ -1,6 +1,7 @@
 //! Gathers what a picture of virtual surface lights shall be like.
 
-use crate::{LayerKind, RenderError};
+use crate::{LayerKind, RenderError, distance_map_edge};
+use photonstream_protocol::VslFrame;
 use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
 
@@ -70,6 +71,17 @@ impl RenderOptions {
             return wrong("layers", format!("[{}]", names.join(", ")), "one or more, each once");
         }
         Ok(())
+    }
+
+    /// Whether `frame` has what the visibility needs.
+    ///
+    /// # Errors
+    /// [`RenderError::NoDistanceMaps`].
+    pub fn check_distance_maps(&self, frame: &VslFrame) -> Result<(), RenderError> {
+        let is_missing =
+            !frame.vsls.is_empty() && distance_map_edge(frame.distances.len(), frame.vsls.len()).is_none();
+        let is_needed = self.visibility == Visibility::Octahedral && self.needs(LayerKind::needs_indirect);
+        if is_missing && is_needed { Err(RenderError::NoDistanceMaps) } else { Ok(()) }
     }
 
     /// Whether any layer asked for has the given need, such as [`LayerKind::needs_direct`].

@@ -2,8 +2,11 @@
 
 use crate::RenderError;
 use glam::Vec3;
-use photonstream_protocol::{PATCH_CORNERS, PatchRecord, VslFrame, VslRecord};
+use photonstream_protocol::{
+    DISTANCE_TEXELS, DistanceRecord, PATCH_CORNERS, PatchRecord, VslFrame, VslRecord,
+};
 use photonstream_scene::config::MAX_LENGTH_M;
+use photonstream_shading::distance_map::EDGES;
 
 /// A virtual surface light: the light that leaves one patch of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +33,16 @@ pub struct VslSet {
     object: Vec<u32>,
     /// As many as there are lights, or none.
     patches: Vec<Patch>,
+    /// Edge of the distance maps in texels; 0 where there are none.
+    map_edge: u32,
+    /// Of each light edge² texels.
+    maps: Vec<u16>,
+}
+
+/// The edge in texels of the distance maps that so many pieces for so many lights are; `None` where they are none.
+pub fn distance_map_edge(pieces: usize, lights: usize) -> Option<u32> {
+    let each = pieces.checked_div(lights).filter(|each| each * lights == pieces)?;
+    EDGES.into_iter().find(|&edge| (edge * edge) as usize == each * DISTANCE_TEXELS)
 }
 
 /// The polygon of a virtual surface light.
@@ -68,7 +81,7 @@ impl VslSet {
     /// # Errors
     /// As [`VslSet::from_records`].
     pub fn from_frame(frame: &VslFrame) -> Result<Self, RenderError> {
-        Ok(Self::from_records(&frame.vsls)?.with_patches(&frame.patches))
+        Ok(Self::from_records(&frame.vsls)?.with_patches(&frame.patches).with_distances(&frame.distances))
     }
 
     /// The same lights with the polygons that records say; without any where there are not as many as lights.
@@ -78,6 +91,29 @@ impl VslSet {
             self.patches.extend(records.iter().map(Patch::of));
         }
         self
+    }
+
+    /// The same lights with the distance maps that records say; without any where they are not as many for each light, or no
+    /// map has so many texels.
+    pub fn with_distances(mut self, records: &[DistanceRecord]) -> Self {
+        self.maps.clear();
+        self.map_edge = distance_map_edge(records.len(), self.len()).unwrap_or(0);
+        if self.map_edge > 0 {
+            let texels = |word: u32| [word as u16, (word >> 16) as u16];
+            self.maps.extend(records.iter().flat_map(|record| record.texels).flat_map(texels));
+        }
+        self
+    }
+
+    /// Edge of the distance maps in texels; 0 where there are none.
+    pub fn map_edge(&self) -> u32 {
+        self.map_edge
+    }
+
+    /// The distance map of light `index`, row by row; empty where there is none.
+    pub fn map(&self, index: usize) -> &[u16] {
+        let texels = (self.map_edge * self.map_edge) as usize;
+        &self.maps[index * texels..][..texels]
     }
 
     /// The polygon of light `index`, where it has one.

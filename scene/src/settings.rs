@@ -27,6 +27,9 @@ pub enum Visibility {
     /// A shadow ray to every virtual surface light.
     #[default]
     Rays,
+    /// The octahedral distance maps of the virtual surface lights, which the simulator traces and publishes: shadows without
+    /// a ray in the renderer ([`photonstream_shading::distance_map`]).
+    Octahedral,
 }
 
 /// What becomes of a virtual surface light beyond its range, where it cannot add `epsilon` to any radiance.
@@ -61,6 +64,8 @@ pub struct StreamingSettings {
     /// Simulated time from one published frame to the next, ms: runs repeat exactly. `None`: as much as passes on the
     /// clock.
     pub fixed_step_ms: Option<f64>,
+    /// Edge of the distance maps of virtual surface lights in texels, for visibility `octahedral`; 0: none are traced.
+    pub distance_map_px: u32,
     /// Relative standard error of the flux, in [0, 1], down to which samples beyond the pool are added while nothing
     /// changes; 0: none are.
     pub target_error: f64,
@@ -74,6 +79,16 @@ impl StreamingSettings {
 
     /// Most virtual surface lights a scene may have.
     pub const MAX_VSLS: u32 = 4_000_000;
+
+    /// Most texels that all distance maps together may have.
+    pub const MAX_DISTANCE_TEXELS: u64 = 1 << 30;
+
+    /// The edge of the distance maps of `vsls` lights where none is asked for: 32 texels, fewer where they would have more
+    /// than 2²⁵ texels (64 MiB) in all.
+    pub fn default_distance_map_px(vsls: u32) -> u32 {
+        let fits = |px: u32| u64::from(vsls) * u64::from(px * px) <= 1 << 25;
+        [32, 16].into_iter().find(|&px| fits(px)).unwrap_or(8)
+    }
 }
 
 impl Default for StreamingSettings {
@@ -88,6 +103,7 @@ impl Default for StreamingSettings {
             threads: None,
             light_columns: 8,
             fixed_step_ms: None,
+            distance_map_px: 0,
             target_error: 0.0,
             latency_ms: 0.0,
         }
@@ -174,4 +190,4 @@ named!(Interpolation, "interpolation", Linear = "linear", Smooth = "smooth", Ste
 named!(Repeat, "repeat", Loop = "loop", Bounce = "bounce", Once = "once");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
 named!(RangeCulling, "culling", Cut = "cut", Stochastic = "stochastic");
-named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays");
+named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays", Octahedral = "octahedral");

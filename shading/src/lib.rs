@@ -8,6 +8,7 @@
 pub mod basis;
 pub mod camera;
 pub mod culling;
+pub mod distance_map;
 pub mod kernel;
 pub mod light;
 pub mod octahedral;

@@ -3,12 +3,16 @@
 //! A twin has the file stem, names, parameter order and expression order of its Rust function. Constants are printed
 //! from Rust, never typed twice.
 
-use crate::{LightShape, patch, surface, tone::ToneMap};
+use crate::{LightShape, distance_map, patch, surface, tone::ToneMap};
 use core::f32::consts::{FRAC_1_PI, PI};
 use std::fmt::Write;
 
 /// Twin of [`crate::kernel`].
 pub const KERNEL: &str = include_str!("../wgsl/kernel.wgsl");
+/// Twin of [`crate::basis`].
+pub const BASIS: &str = include_str!("../wgsl/basis.wgsl");
+/// Twin of [`crate::distance_map`]; the module that includes it has `distance_maps: array<u32>`.
+pub const DISTANCE_MAP: &str = include_str!("../wgsl/distance_map.wgsl");
 /// Twin of [`crate::camera`].
 pub const CAMERA: &str = include_str!("../wgsl/camera.wgsl");
 /// Twin of [`crate::culling`].
@@ -25,8 +29,10 @@ pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 8] = [
+pub const TWINS: [(&str, &str); 10] = [
     ("kernel", KERNEL),
+    ("basis", BASIS),
+    ("distance_map", DISTANCE_MAP),
     ("camera", CAMERA),
     ("culling", CULLING),
     ("light", LIGHT),
@@ -59,8 +65,12 @@ pub fn constants() -> String {
     float("PI", PI);
     float("FRAC_1_PI", FRAC_1_PI);
     float("F32_MAX", f32::MAX);
+    float("F32_MIN_POSITIVE", f32::MIN_POSITIVE);
     float("RELATIVE_OFFSET", surface::RELATIVE_OFFSET);
     float("PATCH_NEAR_AREAS", patch::NEAR_AREAS);
+    float("DISTANCE_BIAS_TEXELS", distance_map::BIAS_TEXELS);
+    let _ = writeln!(text, "const DISTANCE_LEAST: u32 = {}u;", distance_map::LEAST);
+    let _ = writeln!(text, "const DISTANCE_SHIFT: u32 = {}u;", distance_map::SHIFT);
     let _ = writeln!(text, "const PATCH_MAX_CORNERS: u32 = {}u;", patch::MAX_CORNERS);
     for (number, name) in LIGHT_KINDS.iter().enumerate() {
         let _ = writeln!(text, "const LIGHT_{name}: u32 = {number}u;");

@@ -7,7 +7,8 @@ use crate::{
     simulation::Simulation,
 };
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{Sampling, Scene, SceneConfig};
+use photonstream_scene::{Sampling, Scene, SceneConfig, StreamingSettings};
+use photonstream_shading::distance_map::EDGES;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
@@ -48,9 +49,46 @@ pub struct Overrides {
     /// Seed of placement and streaming
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Texels along the edge of the virtual surface lights' distance maps, for visibility octahedral: 0 (none), 8, 16, 32,
+    /// 64, or `auto` (32, fewer for more than 32 768 lights)
+    #[arg(long, value_name = "PX")]
+    pub distance_map_px: Option<MapEdge>,
     /// `replay` (unchanged scene, unchanged light) or `fresh` (a stream of new samples)
     #[arg(long)]
     pub sampling: Option<Sampling>,
+}
+
+/// Edge of distance maps, as it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapEdge {
+    /// As many texels as fit the number of lights, unless the config says how many.
+    Auto,
+    /// So many texels.
+    Px(u32),
+}
+
+impl std::str::FromStr for MapEdge {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "0" => Ok(Self::Px(0)),
+            _ => {
+                let known = EDGES.into_iter().find(|px| px.to_string() == text);
+                known.map(Self::Px).ok_or_else(|| "expected auto, 0, 8, 16, 32 or 64".to_owned())
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for MapEdge {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Px(px) => px.fmt(f),
+        }
+    }
 }
 
 impl Overrides {
@@ -61,6 +99,15 @@ impl Overrides {
         streaming.pool_paths = self.pool.or(streaming.pool_paths);
         streaming.seed = self.seed.or(streaming.seed);
         streaming.sampling = self.sampling.or(streaming.sampling);
+        match self.distance_map_px {
+            Some(MapEdge::Px(px)) => streaming.distance_map_px = Some(px),
+            Some(MapEdge::Auto) => {
+                let vsls = streaming.vsls.unwrap_or(StreamingSettings::default().vsls);
+                let px = StreamingSettings::default_distance_map_px(vsls);
+                streaming.distance_map_px.get_or_insert(px);
+            }
+            None => {}
+        }
     }
 
     /// As arguments for another process.
@@ -73,6 +120,7 @@ impl Overrides {
         add("vsls", self.vsls.map(|v| v.to_string()));
         add("pool", self.pool.map(|v| v.to_string()));
         add("seed", self.seed.map(|v| v.to_string()));
+        add("distance-map-px", self.distance_map_px.map(|px| px.to_string()));
         add("sampling", self.sampling.map(|v| v.name().to_owned()));
         arguments
     }

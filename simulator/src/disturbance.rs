@@ -114,7 +114,7 @@ impl Obstacle {
 
     /// Whether the ray from `a` along the unit vector `direction` may cross it.
     #[inline]
-    fn is_crossed_by_ray(&self, a: Vec3A, direction: Vec3A) -> bool {
+    pub(crate) fn is_crossed_by_ray(&self, a: Vec3A, direction: Vec3A) -> bool {
         let beyond = self.centre.distance(a) + self.radius;
         self.is_crossed(a, a + direction * (1.001 * beyond))
     }

@@ -7,6 +7,7 @@ pub mod cancel;
 pub mod change;
 pub mod cli;
 pub mod counters;
+pub mod distance_maps;
 mod disturbance;
 pub mod emitters;
 mod encounters;

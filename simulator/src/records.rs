@@ -2,7 +2,7 @@
 
 use crate::{counters::Counters, flux::FluxReading, patch::Patch, placement::Placement, vsl::Vsl};
 use glam::Vec3;
-use photonstream_protocol::{LightRecord, ObjectRecord, PatchRecord, VslRecord};
+use photonstream_protocol::{DistanceRecord, LightRecord, ObjectRecord, PatchRecord, VslRecord};
 use photonstream_scene::{ObjectId, Scene};
 use photonstream_shading::LightShape;
 
@@ -61,6 +61,11 @@ pub fn write_patches(
     for (place, light) in records.iter_mut().zip(lights).filter(|(_, (_, vsl))| moved(vsl)) {
         *place = record(light);
     }
+}
+
+/// The pieces of distance maps, whose words lie one map after the other: [`crate::distance_maps::all`].
+pub fn distance_records(maps: &[u32]) -> Vec<DistanceRecord> {
+    maps.as_chunks().0.iter().map(|&texels| DistanceRecord { texels }).collect()
 }
 
 /// Writes flux, standard error and age into the records; `now_ms` counts since the simulation started.

@@ -5,8 +5,9 @@ use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{RenderOptions, VslSet, Watch};
 use photonstream_renderer_cpu::render;
-use photonstream_scene::{Sampling, Scene};
+use photonstream_scene::{Sampling, Scene, StreamingSettings, Visibility};
 use photonstream_simulator::{
+    distance_maps,
     emitters::Emitters,
     ledger::{Ledger, PATHS_PER_TASK},
     owner::OwnerTable,
@@ -45,6 +46,13 @@ pub(super) fn with_pool(base: &Simulation, point: &Point) -> Simulation {
     let mut scene = Scene::clone(&base.scene);
     let streaming = &mut scene.streaming;
     (streaming.pool_paths, streaming.sampling, streaming.seed) = (point.pool, point.sampling, point.seed);
+    streaming.distance_map_px = match point.visibility {
+        Visibility::Octahedral if streaming.distance_map_px == 0 => {
+            StreamingSettings::default_distance_map_px(point.vsls)
+        }
+        Visibility::Octahedral => streaming.distance_map_px,
+        _ => 0,
+    };
     // Refining goes on for as long as it takes; here a pool is a pool.
     streaming.target_error = 0.0;
     with_scene_and_pool(base, scene)
@@ -58,7 +66,7 @@ pub(crate) fn with_scene_and_pool(base: &Simulation, scene: Scene) -> Simulation
     Simulation { scene, emitters, tracer, ..base.clone() }
 }
 
-/// Fills the pool and reads the flux: the lights, and the time in ms. A stream of fresh samples is timed, and read, in its
+/// Fills the pool, reads the flux and traces the distance maps, if there are to be any: the lights, and the time in ms. A stream of fresh samples is timed, and read, in its
 /// second turn, when all its slots hold a path to be replaced.
 pub(crate) fn lights_of(simulation: &Simulation) -> Result<(VslSet, f64), EvaluateError> {
     timed(simulation, |ledger| vsls_of(simulation, ledger))
@@ -100,7 +108,8 @@ pub(crate) fn vsls_of(simulation: &Simulation, ledger: &Ledger) -> Result<VslSet
     let mut vsls = records::vsl_records(&simulation.scene, &simulation.placement);
     records::write_flux(&mut vsls, ledger.readings(&simulation.scene), 0);
     let patches = records::patch_records(&simulation.scene, &simulation.placement);
-    Ok(VslSet::from_records(&vsls)?.with_patches(&patches))
+    let maps = distance_maps::all(&simulation.scene, &simulation.placement);
+    Ok(VslSet::from_records(&vsls)?.with_patches(&patches).with_distances(&records::distance_records(&maps)))
 }
 
 /// A picture of the light of `simulation`, its pool filled.

@@ -153,7 +153,8 @@ impl Simulated<'_> {
         SceneConfig::from_file(self.config)?;
         let channel: ChannelName = format!("render-{}", std::process::id()).parse()?;
         let mut supervisor = Supervisor::new(ChildOutput::Aside)?;
-        supervisor.start(simulator(self.config, &channel, self.overrides, self.after, global))?;
+        let overrides = look.overrides(self.overrides);
+        supervisor.start(simulator(self.config, &channel, &overrides, self.after, global))?;
         let frame = follow::converged_frame(&mut supervisor, &channel);
         supervisor.end();
         remove_channel(&channel);

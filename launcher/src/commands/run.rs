@@ -16,7 +16,7 @@ use crate::{
 };
 use photonstream_protocol::ChannelName;
 use photonstream_scene::SceneConfig;
-use photonstream_simulator::cli::Overrides;
+use photonstream_simulator::cli::{MapEdge, Overrides};
 use serde::Serialize;
 use std::{
     ffi::OsString,
@@ -145,7 +145,12 @@ pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(),
     let output = if global.json { ChildOutput::Aside } else { ChildOutput::Through };
     let recording = args.record.as_ref().map(|file| Background::start(file, &channel)).transpose()?;
     let mut supervisor = Supervisor::new(output)?;
-    let result = supervisor.start(simulator(config, &channel, &args.overrides, None, global));
+    let mut overrides = args.look.overrides(&args.overrides);
+    if args.look.visibility.is_none() && names.iter().any(|name| name == WINDOW) {
+        // What a window shows indirect shadows with, unless it is told to do otherwise.
+        overrides.distance_map_px.get_or_insert(MapEdge::Auto);
+    }
+    let result = supervisor.start(simulator(config, &channel, &overrides, None, global));
     let result = result.and_then(|()| watch(&mut supervisor, &channel, renderers));
     supervisor.end();
     let recorded = recording.map(Background::finish).transpose();

@@ -15,6 +15,7 @@ use photonstream_protocol::{
 pub fn spec(vsls: u32) -> SegmentSpec {
     SegmentSpec {
         vsl_capacity: vsls,
+        distance_capacity: 0,
         object_capacity: 100,
         light_capacity: 8,
         scene_text_capacity: 4096,
@@ -112,6 +113,8 @@ impl Content {
             changed: named.then_some(&self.changed),
             patches: &self.patches,
             patches_changed: named.then_some(&self.changed),
+            distances: &[],
+            distances_changed: None,
             objects: &self.objects,
             lights: &self.lights,
             statistics: &self.statistics,
@@ -211,6 +214,8 @@ impl Content {
             changed: None,
             patches: &[],
             patches_changed: None,
+            distances: &[],
+            distances_changed: None,
             objects: &[],
             lights: &[],
             statistics,

@@ -26,6 +26,7 @@ impl Simulator {
         let scene = crate::scenes::sphere([0.0; 3]);
         let spec = SegmentSpec {
             vsl_capacity: 64,
+            distance_capacity: 0,
             object_capacity: 4,
             light_capacity: 4,
             scene_text_capacity: scene.resolved_text.len() as u32,
@@ -90,6 +91,8 @@ impl Simulator {
             changed: None,
             patches: &[],
             patches_changed: None,
+            distances: &[],
+            distances_changed: None,
             objects: &objects,
             lights: &lights,
             statistics: &statistics,

@@ -37,6 +37,7 @@ impl Channel {
         let name: ChannelName = "import".parse().unwrap();
         let spec = SegmentSpec {
             vsl_capacity: capacity,
+            distance_capacity: 0,
             object_capacity: 1,
             light_capacity: 1,
             scene_text_capacity: 64,
@@ -88,6 +89,8 @@ pub(super) fn publish(publisher: &mut Publisher, vsls: &[VslRecord]) -> u64 {
         changed: Some(&changed),
         patches: &[],
         patches_changed: None,
+        distances: &[],
+        distances_changed: None,
         objects: &[],
         lights: &[],
         statistics: &StatisticsRecord::default(),

@@ -5,7 +5,7 @@ use photonstream_protocol::VslFrame;
 use photonstream_renderer::{LayerKind, RenderOptions, VslSet, Watch};
 use photonstream_renderer_wgpu::{Renderer, Show, View, test_gpu};
 use photonstream_scene::{Scene, SceneConfig, Visibility};
-use photonstream_simulator::{records, simulation::Simulation};
+use photonstream_simulator::{distance_maps, records, simulation::Simulation};
 use std::{path::Path, sync::Arc};
 
 /// A scene with its light, streamed.
@@ -61,9 +61,10 @@ pub(crate) fn lit(text: &str) -> Lit {
         record.changed_frame = 1;
     }
     let patches = records::patch_records(&scene, &simulation.placement);
+    let distances = records::distance_records(&distance_maps::all(&scene, &simulation.placement));
     drop(simulation);
     let scene_hash = scene.hash;
-    let frame = VslFrame { epoch: 1, frame: 1, vsls, patches, scene_hash, ..VslFrame::default() };
+    let frame = VslFrame { epoch: 1, frame: 1, vsls, patches, distances, scene_hash, ..VslFrame::default() };
     Lit { scene: Arc::unwrap_or_clone(scene), frame }
 }
 

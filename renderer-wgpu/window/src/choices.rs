@@ -36,10 +36,11 @@ impl Choices {
         Self { view, exposure_ev: settings.exposure_ev, tone_map: settings.tone_map }
     }
 
-    /// Takes the cheaper way where `args` do not say which: ambient occlusion for rays, and interleaved sampling.
-    pub(crate) fn ease(&mut self, args: &Args) {
+    /// Takes the cheaper way where `args` do not say which: for rays the distance maps, where `has_maps`, else ambient occlusion;
+    /// and interleaved sampling.
+    pub(crate) fn ease(&mut self, args: &Args, has_maps: bool) {
         if args.visibility.is_none() && self.view.visibility == Visibility::Rays {
-            self.view.visibility = Visibility::Ao;
+            self.view.visibility = if has_maps { Visibility::Octahedral } else { Visibility::Ao };
         }
         if args.gpu.interleave.is_none() {
             self.view.interleave = 4;
@@ -129,12 +130,15 @@ mod tests {
 
     #[test]
     fn software_is_spared_what_nobody_asked_for() {
-        let eased = |line: &str| {
+        let eased_with = |line: &str, has_maps: bool| {
             let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
             let (mut choices, _) = choices(line);
-            choices.ease(&args);
+            choices.ease(&args, has_maps);
             (choices.view.visibility, choices.view.interleave)
         };
+        let eased = |line| eased_with(line, false);
+        assert_eq!(eased_with("w", true), (Visibility::Octahedral, 4));
+        assert_eq!(eased_with("w --visibility rays", true), (Visibility::Rays, 4));
         assert_eq!(eased("w"), (Visibility::Ao, 4));
         assert_eq!(eased("w --visibility rays --interleave 1"), (Visibility::Rays, 1));
         assert_eq!(eased("w --visibility none"), (Visibility::None, 4));

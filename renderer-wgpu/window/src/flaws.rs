@@ -1,6 +1,7 @@
 //! Gathers in what the last picture falls short of the published light.
 
 use photonstream_protocol::VslFrame;
+use photonstream_renderer::distance_map_edge;
 use photonstream_renderer_wgpu::{GpuError, Renderer, Shadows, Show, View};
 use photonstream_scene::Visibility;
 
@@ -13,6 +14,8 @@ pub(crate) struct Flaws {
     refused: u32,
     /// Standard error of indirect light by shadow rays, as rel. RMSE.
     noise: Option<f64>,
+    /// Distance maps are asked for, and there are none.
+    lacks_maps: bool,
     is_known: bool,
     /// The segment, its frame and the view of it that `refused` is about.
     counted: Option<(u64, u64, Show)>,
@@ -45,6 +48,8 @@ impl Flaws {
         }
         let by_rays = view.visibility == Visibility::Rays && has_indirect(view);
         self.noise = if by_rays { renderer.noise()? } else { None };
+        let has_maps = distance_map_edge(frame.distances.len(), frame.vsls.len()).is_some();
+        self.lacks_maps = view.visibility == Visibility::Octahedral && has_indirect(view) && !has_maps;
         self.is_known = true;
         Ok(())
     }
@@ -57,6 +62,9 @@ impl Flaws {
     /// What the user should know.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
+        if self.lacks_maps {
+            warnings.push("no distance maps are published; set streaming.distance_map_px = 32".to_owned());
+        }
         if self.unshadowed > 0 {
             let n = self.unshadowed;
             warnings.push(format!("{n} lights without shadows: too many for maps; choose shadows rays"));
@@ -74,6 +82,9 @@ pub(crate) fn approximation(view: &View) -> Option<String> {
     let mut words = Vec::new();
     if view.visibility == Visibility::Ao {
         words.push("ambient occlusion".to_owned());
+    }
+    if view.visibility == Visibility::Octahedral {
+        words.push("shadows from distance maps".to_owned());
     }
     if view.interleave > 1 && view.visibility != Visibility::Rays {
         words.push(format!("interleaved {0}×{0}", view.interleave));

@@ -15,7 +15,10 @@ use crate::{
     pointer::Pointer,
 };
 use photonstream_protocol::{Liveness, Request};
-use photonstream_renderer::telemetry::{ChangeTimes, LightAge};
+use photonstream_renderer::{
+    distance_map_edge,
+    telemetry::{ChangeTimes, LightAge},
+};
 use photonstream_renderer_wgpu::{PassTime, View};
 use photonstream_scene::{LightId, ObjectId, Scene, bvh::Ray};
 use std::time::{Duration, Instant};
@@ -137,7 +140,9 @@ impl Session {
         if self.choices.is_none() {
             self.choices = Some(Choices::new(&scene.render, &scene.camera, &self.args));
             if self.eases {
-                self.choices.iter_mut().for_each(|choices| choices.ease(&self.args));
+                let frame = &published.frame;
+                let has_maps = distance_map_edge(frame.distances.len(), frame.vsls.len()).is_some();
+                self.choices.iter_mut().for_each(|choices| choices.ease(&self.args, has_maps));
             }
         }
         let is_gone = match &self.selected {

@@ -45,6 +45,8 @@ fn publish(publisher: &mut Publisher, scene: &Scene) {
         changed: None,
         patches: &[],
         patches_changed: None,
+        distances: &[],
+        distances_changed: None,
         objects: &frame.objects,
         lights: &frame.lights,
         statistics: &frame.statistics,
@@ -59,6 +61,7 @@ fn publish(publisher: &mut Publisher, scene: &Scene) {
 fn spec(scene: &Scene) -> SegmentSpec {
     SegmentSpec {
         vsl_capacity: 1,
+        distance_capacity: 0,
         object_capacity: 16,
         light_capacity: 4,
         scene_text_capacity: 4096,

@@ -63,7 +63,11 @@ impl SceneConfig {
         let animation = animation::read(&mut self, &root)?;
         // A scene is loaded as it is at its beginning.
         animation.write(0.0, &mut self);
-        let streaming = settings::streaming(&mut self.streaming, &root.key("streaming"))?;
+        let streaming = settings::streaming(
+            &mut self.streaming,
+            self.render.visibility.unwrap_or_default(),
+            &root.key("streaming"),
+        )?;
         let render = settings::render(&mut self.render, &root.key("render"))?;
         let mut materials = Materials::read(&self.material, &root.key("material"))?;
 

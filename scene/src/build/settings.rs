@@ -3,14 +3,16 @@
 use crate::{
     config::{Field, RenderConfig, StreamingConfig},
     error::SceneError,
-    settings::{RenderSettings, StreamingSettings},
+    settings::{RenderSettings, StreamingSettings, Visibility},
 };
+use photonstream_shading::distance_map;
 
 /// Largest width and height of a picture in pixels.
 const MAX_PICTURE_PX: u32 = 1 << 14;
 
 pub(super) fn streaming(
     config: &mut StreamingConfig,
+    visibility: Visibility,
     field: &Field<'_>,
 ) -> Result<StreamingSettings, SceneError> {
     let d = StreamingSettings::default();
@@ -20,6 +22,21 @@ pub(super) fn streaming(
     let placement_scale = *config.placement_scale.get_or_insert(widen(d.placement_scale));
     let publish_period_ms = *config.publish_period_ms.get_or_insert(widen(d.publish_period_ms));
     let light_columns = *config.light_columns.get_or_insert(d.light_columns);
+    let default_px = match visibility {
+        Visibility::Octahedral => StreamingSettings::default_distance_map_px(vsls),
+        _ => d.distance_map_px,
+    };
+    let distance_map_px = *config.distance_map_px.get_or_insert(default_px);
+    if distance_map_px != 0 && !distance_map::EDGES.contains(&distance_map_px) {
+        let remedy = "choose one of them, or leave the key out";
+        return Err(field.key("distance_map_px").invalid(distance_map_px, "0, 8, 16, 32 or 64", remedy));
+    }
+    let texels = u64::from(vsls) * u64::from(distance_map_px * distance_map_px);
+    if texels > StreamingSettings::MAX_DISTANCE_TEXELS {
+        let expected = "at most 2³⁰ texels in the maps of all virtual surface lights";
+        let remedy = "choose a smaller distance_map_px or fewer vsls";
+        return Err(field.key("distance_map_px").invalid(distance_map_px, expected, remedy));
+    }
     let target_error = *config.target_error.get_or_insert(d.target_error);
     let latency_ms = *config.latency_ms.get_or_insert(d.latency_ms);
     if let Some(step) = config.fixed_step_ms {
@@ -54,6 +71,7 @@ pub(super) fn streaming(
         threads: config.threads,
         light_columns: field.key("light_columns").count(light_columns, 1..=1024)?,
         fixed_step_ms: config.fixed_step_ms,
+        distance_map_px,
         target_error: field.key("target_error").number(
             target_error,
             "a relative error from 0 to 1",

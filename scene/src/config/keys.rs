@@ -80,6 +80,7 @@ fn every_key() -> SceneConfig {
             threads: Some(1),
             light_columns: Some(1),
             fixed_step_ms: Some(1.0),
+            distance_map_px: Some(8),
             target_error: Some(1.0),
             latency_ms: Some(1.0),
         },

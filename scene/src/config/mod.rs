@@ -257,6 +257,8 @@ pub struct StreamingConfig {
     pub light_columns: Option<u32>,
     /// Simulated time from one published frame to the next; default: as much as passes on the clock.
     pub fixed_step_ms: Option<f64>,
+    /// Edge of the distance maps of virtual surface lights in texels: 0, 8, 16, 32 or 64.
+    pub distance_map_px: Option<u32>,
     /// Relative standard error of the flux at which refinement beyond the pool stops.
     pub target_error: Option<f64>,
     /// Time within which a change shall be traced.

@@ -33,6 +33,7 @@ impl Exchange {
             &channel,
             &SegmentSpec {
                 vsl_capacity: vsls.len().max(1) as u32,
+                distance_capacity: 0,
                 object_capacity: objects.len().max(1) as u32,
                 light_capacity: lights.len().max(1) as u32,
                 scene_text_capacity: scene.resolved_text.len() as u32,
@@ -57,6 +58,8 @@ impl Exchange {
                 changed: None,
                 patches: &[],
                 patches_changed: None,
+                distances: &[],
+                distances_changed: None,
                 objects: &objects,
                 lights: &lights,
                 statistics: &StatisticsRecord::default(),

@@ -6,12 +6,14 @@ mod telemetry;
 pub use telemetry::State;
 
 use super::{
+    published_maps::MapUpdate,
     publisher_actor::{PlacedRecords, Snapshot, Still},
     tracer_actor::Work,
 };
 use crate::{
     change::Change as SceneChange,
     counters::Counters,
+    distance_maps::{Schedule, Traced},
     ledger::{Ledger, Task},
     records,
     simulation::Simulation,
@@ -28,6 +30,8 @@ use std::{
 pub(super) enum ToLedger {
     /// A tracer has finished a task.
     Finished(Box<(Task, PathBatch)>),
+    /// A tracer has traced the distance map of a virtual surface light.
+    Mapped(Box<Traced>),
     /// Change what is done; the answer is the number of the first frame that shows it.
     Change(Change, flume::Sender<u64>),
     /// Go on in a new version of the scene; the answer is the number of the first frame that shows it.
@@ -95,6 +99,10 @@ struct Progress {
     placements: u64,
     /// Their patches, once they were published.
     patches: Option<progress::Placed>,
+    /// Their distance maps, where the scene asks for them.
+    maps: Option<Schedule>,
+    /// Rays traced for maps.
+    map_rays: u64,
     /// Time of the simulated scene.
     time_s: f64,
     only_whole: bool,
@@ -145,6 +153,8 @@ impl LedgerActor {
             places: 0,
             placements: 0,
             patches: None,
+            maps: Schedule::new(&self.simulation, 0),
+            map_rays: 0,
             time_s: 0.0,
             only_whole: self.only_whole,
             versions: 0,
@@ -177,11 +187,11 @@ impl LedgerActor {
             let now = Instant::now();
             progress.note_activity(now);
             let done = self.is_done(&progress);
-            let settled = progress.ledger.in_flight() == 0;
+            let settled = progress.in_flight() == 0;
             // Of a step, and of fixed steps, the whole light is shown; in a drag that is faster than light not for ever.
             let wants_whole = (progress.only_whole && !progress.paused) || progress.stepping;
             let has_waited = progress.changed && now >= progress.shown_at + LONGEST_WAIT;
-            let may_be_shown = !wants_whole || progress.ledger.is_settled() || done || has_waited;
+            let may_be_shown = !wants_whole || progress.is_whole() || done || has_waited;
             let is_at_rest = settled && (done || progress.paused);
             let is_due = now >= progress.next_frame || is_at_rest;
             if progress.changed && may_be_shown && is_due {
@@ -217,7 +227,9 @@ impl LedgerActor {
         if !progress.paused && !self.is_at_limit(progress) {
             progress.follow_variance();
         }
-        let most = 2 * self.threads as u64 + 2;
+        let room = 2 * self.threads as u64 + 2;
+        let has_maps = progress.maps.as_ref().is_some_and(|maps| !maps.is_whole());
+        let most = if has_maps { room / 2 } else { room };
         while progress.ledger.in_flight() < most && (!progress.paused || progress.stepping) {
             // An edit is followed to its end, whatever the limit.
             let task = match self.is_at_limit(progress) {
@@ -228,7 +240,16 @@ impl LedgerActor {
             progress.paths_given += task.draws.len() as u64;
             let batch = progress.spare.pop().unwrap_or_default();
             let tracer = Arc::clone(&progress.tracer);
-            if self.work.send(Work { tracer, task, batch }).is_err() {
+            if self.work.send(Work::Paths { tracer, task, batch }).is_err() {
+                return false;
+            }
+        }
+        let Some(maps) = progress.maps.as_mut().filter(|_| !progress.paused || progress.stepping) else {
+            return true;
+        };
+        while maps.in_flight() as u64 + progress.ledger.in_flight() < room {
+            let Some(task) = maps.next_task() else { break };
+            if self.work.send(Work::Map(Box::new(task))).is_err() {
                 return false;
             }
         }
@@ -242,7 +263,7 @@ impl LedgerActor {
     fn is_done(&self, progress: &Progress) -> bool {
         let ledger = &progress.ledger;
         let rests = self.is_at_limit(progress) && ledger.in_flight() == 0 && ledger.stale_paths() == 0;
-        ledger.is_done() || rests
+        (ledger.is_done() || rests) && progress.has_whole_maps()
     }
 
     /// False where it is time to end.
@@ -254,6 +275,13 @@ impl LedgerActor {
                 progress.traced_ns = monotonic_ns();
                 progress.spare.extend(progress.ledger.apply(task, batch, birth_ms));
                 progress.note_whole_light();
+                progress.changed = true;
+            }
+            ToLedger::Mapped(traced) => {
+                progress.map_rays += traced.rays;
+                if let Some(maps) = &mut progress.maps {
+                    maps.finish(*traced);
+                }
                 progress.changed = true;
             }
             ToLedger::Change(change, reply) => {
@@ -299,8 +327,10 @@ impl LedgerActor {
         let still = Arc::clone(&progress.still);
         let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
-        let statistics = self.statistics(progress, converged || progress.ledger.is_converged());
-        let snapshot = Snapshot { vsls, patches, still, statistics, paused: progress.paused };
+        let has_converged = progress.ledger.is_converged() && progress.has_whole_maps();
+        let statistics = self.statistics(progress, converged || has_converged);
+        let maps = progress.maps.as_mut().map(|maps| MapUpdate::of(maps, progress.placements));
+        let snapshot = Snapshot { vsls, patches, maps, still, statistics, paused: progress.paused };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }
@@ -311,7 +341,7 @@ impl LedgerActor {
         progress.shown_at = now;
         progress.changed = false;
         progress.stepping = false;
-        if progress.unsettled && progress.ledger.is_settled() {
+        if progress.unsettled && progress.is_whole() {
             progress.unsettled = false;
             // Whoever does not listen does not wait for it.
             let _ = self.settled.send(progress.versions);

@@ -20,6 +20,7 @@ mod ledger_actor;
 mod loader;
 mod placements;
 mod placer;
+mod published_maps;
 mod publisher_actor;
 mod settings;
 mod stamp;

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use super::published_maps::{MapUpdate, PublishedMaps};
 use crate::records;
 use crossbeam::queue::ArrayQueue;
 use photonstream_protocol::{
@@ -23,6 +24,8 @@ pub(super) struct Snapshot {
     pub(super) vsls: PlacedRecords,
     /// The same allocation for as long as no patch changes.
     pub(super) patches: Arc<[PatchRecord]>,
+    /// What has changed of the distance maps; `None` where there are none.
+    pub(super) maps: Option<MapUpdate>,
     pub(super) still: Arc<Still>,
     pub(super) statistics: StatisticsRecord,
     pub(super) paused: bool,
@@ -63,11 +66,12 @@ impl Still {
         }
     }
 
-    /// What a segment for a frame of so many virtual surface lights has to hold; no less than `least`.
-    pub(super) fn spec(&self, vsls: usize, least: Option<&SegmentSpec>) -> SegmentSpec {
+    /// What a segment for a frame of so many virtual surface lights and pieces of distance maps has to hold; no less than `least`.
+    pub(super) fn spec(&self, vsls: usize, distances: usize, least: Option<&SegmentSpec>) -> SegmentSpec {
         let size = |count: usize, least: Option<u32>| (count.max(1) as u32).max(least.unwrap_or(0));
         SegmentSpec {
             vsl_capacity: size(vsls, least.map(|l| l.vsl_capacity)),
+            distance_capacity: (distances as u32).max(least.map_or(0, |l| l.distance_capacity)),
             object_capacity: size(self.objects.len(), least.map(|l| l.object_capacity)),
             light_capacity: size(self.lights.len(), least.map(|l| l.light_capacity)),
             scene_text_capacity: size(self.scene_text.len(), least.map(|l| l.scene_text_capacity)),
@@ -118,6 +122,8 @@ pub(super) struct PublisherActor {
     pub(super) refused: Option<Refused>,
     /// The patches published last.
     pub(super) patches: Option<Arc<[PatchRecord]>>,
+    /// The distance maps of the newest placement.
+    pub(super) maps: PublishedMaps,
 }
 
 /// A segment that could not be made.
@@ -148,6 +154,7 @@ impl PublisherActor {
                     if last.as_ref().is_some_and(|last| last.paused) != snapshot.paused {
                         self.publisher.set_paused(snapshot.paused);
                     }
+                    self.maps.update(snapshot.maps.as_ref());
                     let free = match (self.make_room(&snapshot), &last) {
                         (Ok(()), _) => {
                             self.publish(&snapshot, &snapshot.still.notice)?;
@@ -186,7 +193,8 @@ impl PublisherActor {
     /// Where there is no room for it, which is then noted; tried again after a while.
     fn make_room(&mut self, snapshot: &Snapshot) -> Result<(), ()> {
         let spec = self.publisher.spec();
-        let least = snapshot.still.spec(snapshot.vsls.records.len(), Some(spec));
+        let distances = snapshot.maps.as_ref().map_or(0, MapUpdate::records);
+        let least = snapshot.still.spec(snapshot.vsls.records.len(), distances, Some(spec));
         // Only a larger or another scene needs another one: what is too large is kept for the next.
         if least == *spec {
             self.refused = None;
@@ -210,14 +218,19 @@ impl PublisherActor {
     fn publish(&mut self, snapshot: &Snapshot, notice: &str) -> Result<(), ProtocolError> {
         let is_same = self.patches.as_ref().is_some_and(|last| Arc::ptr_eq(last, &snapshot.patches));
         let count = snapshot.patches.len();
+        let none = ChunkSet::default();
         let patches_changed = if is_same { ChunkSet::for_records(count) } else { ChunkSet::all(count) };
         // What fails to be published is not what was published last.
         self.patches = None;
-        let frame = self.publisher.publish(&FrameSource {
+        let has_maps = self.maps.are_of(snapshot.vsls.placement);
+        let (distances, distances_changed) = if has_maps { self.maps.records() } else { (&[][..], &none) };
+        let published = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls.records,
             changed: None,
             patches: &snapshot.patches,
             patches_changed: Some(&patches_changed),
+            distances,
+            distances_changed: Some(distances_changed),
             objects: &snapshot.still.objects,
             lights: &snapshot.still.lights,
             statistics: &snapshot.statistics,
@@ -225,7 +238,13 @@ impl PublisherActor {
             notice,
             config_generation: snapshot.still.config_generation,
             simulation_time_s: snapshot.statistics.simulation_time_s,
-        })?;
+        });
+        if has_maps && published.is_ok() {
+            self.maps.published();
+        } else {
+            self.maps.not_published();
+        }
+        let frame = published?;
         self.patches = Some(Arc::clone(&snapshot.patches));
         self.latest_frame.store(frame, Ordering::Release);
         Ok(())

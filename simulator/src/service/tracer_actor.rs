@@ -2,24 +2,32 @@
 
 use super::ledger_actor::ToLedger;
 use crate::{
+    distance_maps::MapTask,
     ledger::Task,
     tracer::{PathBatch, Tracer, Wave},
 };
 use std::sync::Arc;
 
-/// Work for a tracer thread, with the memory to put the result in.
-pub(super) struct Work {
-    pub(super) tracer: Arc<Tracer>,
-    pub(super) task: Task,
-    pub(super) batch: PathBatch,
+/// Work for a tracer thread.
+pub(super) enum Work {
+    /// Paths to trace, with the memory to put them in.
+    Paths { tracer: Arc<Tracer>, task: Task, batch: PathBatch },
+    /// What a virtual surface light sees.
+    Map(Box<MapTask>),
 }
 
 /// Takes work until there is nobody left to give it or to take the result.
 pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>) {
     let mut wave = Wave::default();
-    while let Ok(Work { tracer, task, mut batch }) = work.recv() {
-        tracer.resume(&task.draws, &task.begun, &mut wave, &mut batch);
-        if ledger.send(ToLedger::Finished(Box::new((task, batch)))).is_err() {
+    while let Ok(work) = work.recv() {
+        let done = match work {
+            Work::Paths { tracer, task, mut batch } => {
+                tracer.resume(&task.draws, &task.begun, &mut wave, &mut batch);
+                ToLedger::Finished(Box::new((task, batch)))
+            }
+            Work::Map(task) => ToLedger::Mapped(Box::new(task.run())),
+        };
+        if ledger.send(done).is_err() {
             return;
         }
     }

@@ -2,6 +2,7 @@
 
 mod animated;
 mod closed_forms;
+mod distance_maps;
 mod edits;
 mod exactness;
 mod placed;

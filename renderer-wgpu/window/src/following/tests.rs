@@ -13,6 +13,7 @@ const ROOM: &str = "origin_m = [0, 0, 0]\n[camera]\nposition_m = [0, 0, 3]\ntarg
 fn spec(scene: &Scene) -> SegmentSpec {
     SegmentSpec {
         vsl_capacity: 1,
+        distance_capacity: 0,
         object_capacity: 4,
         light_capacity: 4,
         scene_text_capacity: 4096,
@@ -29,6 +30,8 @@ fn publish(publisher: &mut Publisher, scene: &Scene) {
         changed: None,
         patches: &[],
         patches_changed: None,
+        distances: &[],
+        distances_changed: None,
         objects: &object_records(scene),
         lights: &light_records(scene),
         statistics: &StatisticsRecord::default(),

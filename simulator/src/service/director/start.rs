@@ -10,13 +10,14 @@ use crate::{
         loader,
         placements::Placements,
         placer,
+        published_maps::PublishedMaps,
         publisher_actor::{PlacedRecords, PublisherActor, RECORD_SETS, Still},
         spawn, tracer_actor, watcher,
     },
     simulation::Simulation,
 };
 use crossbeam::queue::ArrayQueue;
-use photonstream_protocol::{ControlServer, Publisher};
+use photonstream_protocol::{ControlServer, DISTANCE_TEXELS, Publisher};
 use std::{
     sync::{
         Arc,
@@ -36,7 +37,9 @@ impl Director {
         let place = records::vsl_records(&scene, &simulation.placement);
         let place = PlacedRecords { records: place, version: 0, placement: 0 };
         let still = Arc::new(Still::new(&scene));
-        let spec = still.spec(place.records.len(), None);
+        let edge = scene.streaming.distance_map_px as usize;
+        let distances = place.records.len() * edge * edge / DISTANCE_TEXELS;
+        let spec = still.spec(place.records.len(), distances, None);
         let publisher = Publisher::create(&options.channel, &spec)?;
         let server = ControlServer::start(&publisher)?;
 
@@ -70,6 +73,7 @@ impl Director {
             orderly: Arc::clone(&orderly),
             refused: None,
             patches: None,
+            maps: PublishedMaps::default(),
         };
         let publisher = {
             let farewell = Farewell(farewells.clone());

@@ -1,7 +1,7 @@
 //! Turns new versions of the scene into what the ledger goes on with, and the time that changes take into budgets.
 
 use super::{Progress, SceneChange, Version};
-use crate::{ledger::Migration, records, simulation::Simulation};
+use crate::{distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
 use photonstream_protocol::{PatchRecord, monotonic_ns};
 use photonstream_scene::Geometry;
 use std::{
@@ -30,6 +30,9 @@ impl Progress {
             let change = SceneChange::between(&self.simulation, &simulation);
             let budget = self.budget(&simulation);
             self.ledger.revise(&simulation, change, budget);
+            if let Some(maps) = &mut self.maps {
+                maps.revise(&simulation);
+            }
         } else {
             self.places += 1;
             self.placements += 1;
@@ -38,6 +41,7 @@ impl Progress {
             let old = std::mem::replace(&mut self.ledger, simulation.ledger());
             let budget = self.budget(&simulation);
             self.ledger = old.migrate(&migration, &simulation, budget);
+            self.replace_maps(&simulation);
         }
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;
@@ -58,6 +62,26 @@ impl Progress {
         self.split_is_due |= !self.ledger.is_settled();
         self.note_whole_light();
         self.changed = true;
+    }
+
+    /// Begins the maps of other lights. Maps under way are lost.
+    fn replace_maps(&mut self, simulation: &Simulation) {
+        self.maps = Schedule::new(simulation, self.placements);
+    }
+
+    /// Tasks of all kinds that are under way.
+    pub(super) fn in_flight(&self) -> u64 {
+        self.ledger.in_flight() + self.maps.as_ref().map_or(0, |maps| maps.in_flight() as u64)
+    }
+
+    /// Whether every distance map, if there are any, is that of the present scene.
+    pub(super) fn has_whole_maps(&self) -> bool {
+        self.maps.as_ref().is_none_or(Schedule::is_whole)
+    }
+
+    /// Whether all light and all shadows are those of the present scene.
+    pub(super) fn is_whole(&self) -> bool {
+        self.ledger.is_settled() && self.has_whole_maps()
     }
 
     /// The patches of the virtual surface lights: the same allocation until one of them changes.
@@ -144,7 +168,7 @@ impl Progress {
     }
 
     pub(super) fn note_activity(&mut self, now: Instant) {
-        match (self.ledger.in_flight() > 0, self.active_since) {
+        match (self.in_flight() > 0, self.active_since) {
             (true, None) => self.active_since = Some(now),
             (false, Some(since)) => {
                 self.active += now - since;

@@ -86,7 +86,8 @@ impl LedgerActor {
     }
 
     pub(super) fn state(&self, progress: &Progress) -> State {
-        let converged = self.is_done(progress) || progress.ledger.is_converged();
+        let converged =
+            self.is_done(progress) || (progress.ledger.is_converged() && progress.has_whole_maps());
         let statistics = self.statistics(progress, converged);
         State {
             scene: progress.simulation.scene.name.clone(),

@@ -20,6 +20,7 @@ fn snapshot(scene: &Scene, vsls: usize) -> Snapshot {
     Snapshot {
         vsls: PlacedRecords { records: vec![VslRecord::default(); vsls], version: 0, placement: 0 },
         patches: Arc::default(),
+        maps: None,
         still: Arc::new(Still::new(scene)),
         statistics: StatisticsRecord::default(),
         paused: false,
@@ -47,7 +48,7 @@ fn the_last_scene_goes_on_where_there_is_no_room() {
     let channel: ChannelName = "full".parse().unwrap();
     let (small, large) = (scene(1.0), scene(2.0));
     let first = snapshot(&small, 5);
-    let publisher = Publisher::create_in(&runtime, &channel, &first.still.spec(5, None)).unwrap();
+    let publisher = Publisher::create_in(&runtime, &channel, &first.still.spec(5, 0, None)).unwrap();
     let (sender, snapshots) = flume::bounded(1);
     let emptied = Arc::new(ArrayQueue::new(RECORD_SETS));
     let actor = PublisherActor {
@@ -58,6 +59,7 @@ fn the_last_scene_goes_on_where_there_is_no_room() {
         orderly: Arc::new(AtomicBool::new(true)),
         refused: None,
         patches: None,
+        maps: PublishedMaps::default(),
     };
     let thread = std::thread::spawn(move || actor.run());
     let mut subscriber =
