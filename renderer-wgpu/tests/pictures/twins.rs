@@ -451,7 +451,7 @@ fn patch() {
         .map(|x| {
             let mut y = [0.0; 16];
             let normal = direction(x, 0);
-            let (u, v) = photonstream_shading::basis::tangents(normal);
+            let (u, v) = basis::tangents(normal);
             // Counter-clockwise as the lit side sees them, around a place before which the receiver lies.
             let away = direction(x, 2) * (10f32).powf(4.0 * x[4] - 3.0);
             let centre = away - normal * (normal.dot(away) + 0.001 + away.length());

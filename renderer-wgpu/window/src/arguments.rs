@@ -4,7 +4,7 @@ use crate::Fault;
 use photonstream_protocol::ChannelName;
 use photonstream_renderer::{LayerKind, cli::Size};
 use photonstream_renderer_wgpu::cli::GpuArgs;
-use photonstream_scene::Visibility;
+use photonstream_scene::{RangeCulling, Visibility};
 use photonstream_shading::Kernel;
 use std::path::PathBuf;
 
@@ -23,12 +23,19 @@ pub struct Args {
     /// End after having shown so many published frames.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
-    /// How light falls off at first: paper or disc; the scene's own if not given.
+    /// How light falls off at first: patch, disc or paper; the scene's own if not given.
     #[arg(long, value_name = "K")]
     pub kernel: Option<Kernel>,
-    /// Shadows of indirect light at first: none, ao or rays; the scene's own if not given.
+    /// Shadows of indirect light at first: none, ao, rays or octahedral; the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
+    /// A virtual surface light's range ends where it adds less than this radiance, W m⁻² sr⁻¹; 0: never. The scene's own if
+    /// not given.
+    #[arg(long, value_name = "E")]
+    pub epsilon: Option<f32>,
+    /// Lights beyond their range at first: stochastic or cut; the scene's own if not given.
+    #[arg(long, value_name = "C")]
+    pub culling: Option<RangeCulling>,
     /// What is shown at first: full, direct, indirect, albedo, normal, vsl, flux, depth.
     #[arg(long, value_name = "LAYER", default_value = "full")]
     pub show: LayerKind,
@@ -57,7 +64,7 @@ mod tests {
         let args = Command::try_parse_from(["w"]).unwrap().args;
         assert_eq!((args.channel.as_str(), args.show, args.frames), ("default", LayerKind::Full, None));
         let line = "w --channel a --out x --size 320x200 --adapter llvm --software --frames 3 --kernel paper \
-                    --visibility ao --accumulation splat --shadows rays --show indirect";
+                    --visibility ao --epsilon 0.5 --culling cut --accumulation splat --shadows rays --show indirect";
         let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
         assert_eq!(args.gpu.adapter(), AdapterChoice { name: Some("llvm".into()), software: true });
         assert_eq!(args.size, Some(Size { width: 320, height: 200 }));

@@ -8,7 +8,7 @@ pub use telemetry::State;
 use super::{
     published_maps::MapUpdate,
     publisher_actor::{PlacedRecords, Snapshot, Still},
-    tracer_actor::Work,
+    tracer_actor::{PathWork, Work},
 };
 use crate::{
     change::Change as SceneChange,
@@ -240,7 +240,8 @@ impl LedgerActor {
             progress.paths_given += task.draws.len() as u64;
             let batch = progress.spare.pop().unwrap_or_default();
             let tracer = Arc::clone(&progress.tracer);
-            if self.work.send(Work::Paths { tracer, task, batch }).is_err() {
+            let work = Work::Paths(Box::new(PathWork { tracer, task, batch }));
+            if self.work.send(work).is_err() {
                 return false;
             }
         }

@@ -8,10 +8,17 @@ use crate::{
 };
 use std::sync::Arc;
 
+/// Paths to trace, with the memory to put them in.
+pub(super) struct PathWork {
+    pub(super) tracer: Arc<Tracer>,
+    pub(super) task: Task,
+    pub(super) batch: PathBatch,
+}
+
 /// Work for a tracer thread.
 pub(super) enum Work {
-    /// Paths to trace, with the memory to put them in.
-    Paths { tracer: Arc<Tracer>, task: Task, batch: PathBatch },
+    /// Paths.
+    Paths(Box<PathWork>),
     /// What a virtual surface light sees.
     Map(Box<MapTask>),
 }
@@ -21,7 +28,8 @@ pub(super) fn run(work: &flume::Receiver<Work>, ledger: &flume::Sender<ToLedger>
     let mut wave = Wave::default();
     while let Ok(work) = work.recv() {
         let done = match work {
-            Work::Paths { tracer, task, mut batch } => {
+            Work::Paths(work) => {
+                let PathWork { tracer, task, mut batch } = *work;
                 tracer.resume(&task.draws, &task.begun, &mut wave, &mut batch);
                 ToLedger::Finished(Box::new((task, batch)))
             }
