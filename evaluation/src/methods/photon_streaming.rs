@@ -66,8 +66,8 @@ pub(crate) fn with_scene_and_pool(base: &Simulation, scene: Scene) -> Simulation
     Simulation { scene, emitters, tracer, ..base.clone() }
 }
 
-/// Fills the pool, reads the flux and traces the distance maps, if there are to be any: the lights, and the time in ms. A stream of fresh samples is timed, and read, in its
-/// second turn, when all its slots hold a path to be replaced.
+/// Fills the pool, reads the flux and traces the distance maps, if there are to be any: the lights, and the time in ms. A
+/// stream of fresh samples is timed, and read, in its second turn, when all its slots hold a path to be replaced.
 pub(crate) fn lights_of(simulation: &Simulation) -> Result<(VslSet, f64), EvaluateError> {
     timed(simulation, |ledger| vsls_of(simulation, ledger))
 }
@@ -79,7 +79,9 @@ pub(super) fn frame_of(simulation: &Simulation) -> Result<(VslFrame, f64), Evalu
         let mut vsls = records::vsl_records(scene, &simulation.placement);
         records::write_flux(&mut vsls, ledger.readings(scene), 0);
         let patches = records::patch_records(scene, &simulation.placement);
-        Ok(VslFrame { epoch: 1, frame: 1, vsls, patches, ..VslFrame::default() })
+        let maps = distance_maps::all(scene, &simulation.placement);
+        let distances = records::distance_records(&maps);
+        Ok(VslFrame { epoch: 1, frame: 1, vsls, patches, distances, ..VslFrame::default() })
     })
 }
 
