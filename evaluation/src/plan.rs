@@ -154,7 +154,7 @@ pub fn plan(base: &Point, effort: Effort, ways: &[Way]) -> Vec<Planned> {
         for &visibility in Visibility::ALL {
             add(ACCUMULATION, on_device(base, way, visibility));
         }
-        for visibility in [Visibility::None, base.visibility] {
+        for visibility in [Visibility::None, Visibility::Octahedral, base.visibility] {
             for &(vsls, pool) in effort.pairs() {
                 add(GPU, Point { vsls, pool, ..on_device(base, way, visibility) });
             }

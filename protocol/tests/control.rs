@@ -8,7 +8,8 @@ use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 use photonstream_protocol::{
-    ChannelName, ControlClient, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request, Runtime,
+    ABI_MAJOR, ChannelName, ControlClient, ControlServer, Incoming, ProtocolError, Publisher, Reply, Request,
+    Runtime,
 };
 use support::{Content, spec};
 
@@ -101,7 +102,7 @@ fn rude_clients_get_typed_errors() {
     let path = simulator.root.path().join("default/control.sock");
     let connect = || UnixStream::connect(&path).unwrap();
     let mut stream = connect();
-    for byte in message(r#"{"type":"hello","abi":3}"#) {
+    for byte in message(&format!(r#"{{"type":"hello","abi":{ABI_MAJOR}}}"#)) {
         stream.write_all(&[byte]).unwrap();
     }
     assert_eq!(reply(&mut stream), Reply::Ok { frame: simulator.publisher.frame() });
@@ -124,7 +125,7 @@ fn rude_clients_get_typed_errors() {
     assert_eq!(stream.read(&mut [0]).unwrap(), 0);
     // A client that hangs up without waiting is still heard.
     let mut stream = connect();
-    stream.write_all(&message(r#"{"type":"hello","abi":3}"#)).unwrap();
+    stream.write_all(&message(&format!(r#"{{"type":"hello","abi":{ABI_MAJOR}}}"#))).unwrap();
     stream.write_all(&message(r#"{"type":"resume"}"#)).unwrap();
     drop(stream);
     assert_eq!(simulator.server.requests().recv_timeout(LIMIT).unwrap().request, Request::Resume);

@@ -9,12 +9,12 @@ use std::os::unix::fs::{FileExt, PermissionsExt};
 use std::path::PathBuf;
 
 use photonstream_protocol::{
-    AccessMode, ChannelName, ProtocolError, Publisher, Reading, Runtime, Subscriber,
+    ABI_MAJOR, AccessMode, ChannelName, ProtocolError, Publisher, Reading, Runtime, Subscriber,
 };
 use proptest::prelude::*;
 use support::{Content, Random, check, spec};
 
-const HEADER_BYTES: usize = 73 * 8;
+const HEADER_BYTES: usize = 121 * 8;
 const STATE_BYTE: u64 = 2048;
 
 /// A segment with one frame, its publisher gone, so that tests may write to it.
@@ -81,7 +81,7 @@ impl Victim {
     }
 }
 
-/// All 4 672 bits of the header, one at a time: each is noticed.
+/// All 7 744 bits of the header, one at a time: each is noticed.
 #[test]
 fn every_flipped_header_bit_is_refused() {
     let victim = Victim::new();
@@ -108,10 +108,10 @@ fn every_flipped_header_bit_is_refused() {
 #[test]
 fn foreign_segments_are_told_apart() {
     let victim = Victim::new();
-    victim.write_header(&[(1, 4)]);
+    victim.write_header(&[(1, ABI_MAJOR + 1)]);
     assert!(matches!(
         victim.attach(AccessMode::Mapped),
-        Err(ProtocolError::VersionMismatch { found_major: 4, expected: 3, .. })
+        Err(ProtocolError::VersionMismatch { found_major, expected: ABI_MAJOR, .. }) if found_major == ABI_MAJOR + 1
     ));
     victim.write_header(&[(2, 9)]);
     victim.attach(AccessMode::Mapped).unwrap();
