@@ -111,7 +111,7 @@ record! {
         corners: [f32; 3 * PATCH_CORNERS],
         /// Number of corners in use: 3 to 8, or 0 where the light has no polygon; those beyond are zero.
         count: u32,
-        /// Area of the polygon in m².
+        /// Area of the polygon in m², as far as it is not inside other bodies: what the flux leaves from.
         area: f32,
     }
 }

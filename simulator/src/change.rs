@@ -166,6 +166,30 @@ fn disturbance(old: &Scene, new: &Scene) -> Disturbance {
     Disturbance::new(touched, obstacles)
 }
 
+/// Objects that differ in their place between two versions of a scene.
+pub(crate) struct Moved {
+    /// For each object whether it has moved.
+    pub(crate) has_moved: Vec<bool>,
+    /// What encloses those that have, where they were and where they are.
+    pub(crate) obstacles: Vec<Obstacle>,
+}
+
+impl Moved {
+    pub(crate) fn between(old: &Scene, new: &Scene) -> Self {
+        let reach = reach_of(old).max(reach_of(new));
+        let mut has_moved = vec![false; new.objects.len()];
+        let mut obstacles = Vec::new();
+        for (object, (before, after)) in old.objects.iter().zip(&new.objects).enumerate() {
+            if before.world_from_rest != after.world_from_rest {
+                has_moved[object] = true;
+                obstacles.extend(obstacle(old, before, reach));
+                obstacles.extend(obstacle(new, after, reach));
+            }
+        }
+        Self { has_moved, obstacles }
+    }
+}
+
 /// Whether a path that hits an object is reflected as it was in another version.
 pub(crate) fn reflects_alike(old: &Scene, before: &Object, new: &Scene, after: &Object) -> bool {
     let albedo = |scene: &Scene, object: &Object| scene.materials[object.material.0 as usize].albedo;

@@ -12,6 +12,7 @@ mod disturbance;
 pub mod emitters;
 mod encounters;
 pub mod error;
+pub mod exposure;
 pub mod flux;
 pub mod ledger;
 pub mod owner;

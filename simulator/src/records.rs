@@ -1,6 +1,9 @@
 //! Turns the simulator's state into the records that renderers read.
 
-use crate::{counters::Counters, flux::FluxReading, patch::Patch, placement::Placement, vsl::Vsl};
+use crate::{
+    counters::Counters, flux::FluxReading, patch::Patch, placement::Placement, simulation::Simulation,
+    vsl::Vsl,
+};
 use glam::Vec3;
 use photonstream_protocol::{DistanceRecord, LightRecord, ObjectRecord, PatchRecord, VslRecord};
 use photonstream_scene::{ObjectId, Scene};
@@ -26,20 +29,16 @@ pub fn write_places(records: &mut [VslRecord], scene: &Scene, placement: &Placem
 }
 
 /// The polygon of each virtual surface light, as it lies in this version of the scene.
-pub fn patch_records(scene: &Scene, placement: &Placement) -> Vec<PatchRecord> {
-    let mut records = vec![PatchRecord::default(); placement.patches.len()];
-    write_patches(&mut records, scene, placement, |_| true);
+pub fn patch_records(simulation: &Simulation) -> Vec<PatchRecord> {
+    let mut records = vec![PatchRecord::default(); simulation.placement.patches.len()];
+    write_patches(&mut records, simulation, |_| true);
     records
 }
 
-/// Writes the polygons of those virtual surface lights that `moved`, as they lie in this version of the scene.
-pub fn write_patches(
-    records: &mut [PatchRecord],
-    scene: &Scene,
-    placement: &Placement,
-    moved: impl Fn(&Vsl) -> bool,
-) {
-    let record = |(patch, vsl): (&Patch, &Vsl)| {
+/// Writes the polygons of those virtual surface lights, by their index, that differ, as they lie in this version of the scene.
+pub fn write_patches(records: &mut [PatchRecord], simulation: &Simulation, differs: impl Fn(usize) -> bool) {
+    let Simulation { scene, placement, exposed, .. } = simulation;
+    let record = |(patch, vsl): (&Patch, &Vsl), exposed: f32| {
         let mut record = PatchRecord::default();
         let mut area = Vec3::ZERO;
         let mut last = None;
@@ -52,14 +51,16 @@ pub fn write_patches(
         }
         let first = Vec3::from_slice(&record.corners);
         area += last.map_or(Vec3::ZERO, |last| last.cross(first));
-        record.area = 0.5 * area.length();
+        record.area = 0.5 * area.length() * exposed;
         // A mirrored or crushed object may leave nothing of a polygon.
         let is_usable = record.area > 0.0 && record.corners.iter().all(|x| x.is_finite());
         if is_usable { record } else { PatchRecord::default() }
     };
-    let lights = placement.patches.iter().zip(&placement.vsls);
-    for (place, light) in records.iter_mut().zip(lights).filter(|(_, (_, vsl))| moved(vsl)) {
-        *place = record(light);
+    let lights = placement.patches.iter().zip(&placement.vsls).zip(exposed.iter());
+    for (index, (place, (light, exposed))) in records.iter_mut().zip(lights).enumerate() {
+        if differs(index) {
+            *place = record(light, *exposed);
+        }
     }
 }
 

@@ -3,7 +3,9 @@
 
 use crate::{
     cancel::Cancel,
+    change::Moved,
     emitters::{Emitters, LightSlots},
+    exposure,
     ledger::{Ledger, PATHS_PER_TASK},
     owner::OwnerTable,
     placement::Placement,
@@ -26,6 +28,8 @@ pub struct Simulation {
     pub emitters: Arc<Emitters>,
     /// Traces paths through it.
     pub tracer: Tracer,
+    /// The share of each light's patch that is not inside of something: [`exposure::shares`].
+    pub exposed: Arc<[f32]>,
 }
 
 impl Simulation {
@@ -41,7 +45,8 @@ impl Simulation {
         placement.measure_areas(&scene, &owners);
         let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
-        cancel.or(Self { scene, placement: Arc::new(placement), owners, emitters, tracer })
+        let exposed = exposure::shares(&scene, &placement).into();
+        cancel.or(Self { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed })
     }
 
     /// Whether the virtual surface lights of `scene` are those of this simulation: a version of its scene in which no
@@ -53,6 +58,7 @@ impl Simulation {
     /// The same simulation in an edited version of its scene: the virtual surface lights ride with their objects, and the
     /// pool is split as before, whatever power the lights have now.
     pub fn with_scene(&self, scene: Arc<Scene>) -> Self {
+        let exposed = self.exposed_in(&scene);
         let emitters = Arc::new(self.emitters.with_scene(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&self.owners), Arc::clone(&emitters));
         Self {
@@ -61,7 +67,19 @@ impl Simulation {
             owners: Arc::clone(&self.owners),
             emitters,
             tracer,
+            exposed,
         }
+    }
+
+    fn exposed_in(&self, scene: &Scene) -> Arc<[f32]> {
+        if Arc::ptr_eq(&self.scene.geometry, &scene.geometry) {
+            return Arc::clone(&self.exposed);
+        }
+        let Moved { has_moved, obstacles } = Moved::between(&self.scene, scene);
+        if obstacles.is_empty() {
+            return Arc::clone(&self.exposed);
+        }
+        exposure::followed(&self.exposed, scene, &self.placement, &has_moved, &obstacles).into()
     }
 
     /// Another scene in the place of this one, with lights placed anew. Where the lights and the size of the pool are the

@@ -9,6 +9,7 @@ use photonstream_scene::{Sampling, Scene, StreamingSettings, Visibility};
 use photonstream_simulator::{
     distance_maps,
     emitters::Emitters,
+    exposure,
     ledger::{Ledger, PATHS_PER_TASK},
     owner::OwnerTable,
     placement::Placement,
@@ -34,7 +35,8 @@ pub(super) fn place(scene: &Scene, (vsls, seed, is_as_paper): (u32, u64, bool)) 
         placement.measure_areas(&scene, &owners);
         let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
-        Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer }
+        let exposed = exposure::shares(&scene, &placement).into();
+        Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed }
     } else {
         Simulation::new(scene)
     };
@@ -78,7 +80,7 @@ pub(super) fn frame_of(simulation: &Simulation) -> Result<(VslFrame, f64), Evalu
         let scene = &simulation.scene;
         let mut vsls = records::vsl_records(scene, &simulation.placement);
         records::write_flux(&mut vsls, ledger.readings(scene), 0);
-        let patches = records::patch_records(scene, &simulation.placement);
+        let patches = records::patch_records(simulation);
         let maps = distance_maps::all(scene, &simulation.placement);
         let distances = records::distance_records(&maps);
         Ok(VslFrame { epoch: 1, frame: 1, vsls, patches, distances, ..VslFrame::default() })
@@ -109,7 +111,7 @@ pub(crate) fn tasks(simulation: &Simulation) -> u64 {
 pub(crate) fn vsls_of(simulation: &Simulation, ledger: &Ledger) -> Result<VslSet, EvaluateError> {
     let mut vsls = records::vsl_records(&simulation.scene, &simulation.placement);
     records::write_flux(&mut vsls, ledger.readings(&simulation.scene), 0);
-    let patches = records::patch_records(&simulation.scene, &simulation.placement);
+    let patches = records::patch_records(simulation);
     let maps = distance_maps::all(&simulation.scene, &simulation.placement);
     Ok(VslSet::from_records(&vsls)?.with_patches(&patches).with_distances(&records::distance_records(&maps)))
 }

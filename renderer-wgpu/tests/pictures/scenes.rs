@@ -60,7 +60,7 @@ pub(crate) fn lit(text: &str) -> Lit {
     for record in &mut vsls {
         record.changed_frame = 1;
     }
-    let patches = records::patch_records(&scene, &simulation.placement);
+    let patches = records::patch_records(&simulation);
     let distances = records::distance_records(&distance_maps::all(&scene, &simulation.placement));
     drop(simulation);
     let scene_hash = scene.hash;

@@ -1,11 +1,7 @@
 //! Turns placements and versions of a scene into maps to trace, the coarse ones of all lights first, and keeps what was traced.
 
 use super::{Extent, Map, MapTask, Traced, View, words};
-use crate::{
-    change::{obstacle, reach_of},
-    disturbance::Obstacle,
-    simulation::Simulation,
-};
+use crate::{change::Moved, disturbance::Obstacle, simulation::Simulation};
 use std::{collections::VecDeque, sync::Arc};
 
 /// A map is traced as a whole rather than by more obstacles than this.
@@ -167,16 +163,7 @@ impl Schedule {
         if Arc::ptr_eq(&old.scene.geometry, &next.scene.geometry) {
             return;
         }
-        let reach = reach_of(&old.scene).max(reach_of(&next.scene));
-        let mut has_moved = vec![false; next.scene.objects.len()];
-        let mut obstacles = Vec::new();
-        for (object, (before, after)) in old.scene.objects.iter().zip(&next.scene.objects).enumerate() {
-            if before.world_from_rest != after.world_from_rest {
-                has_moved[object] = true;
-                obstacles.extend(obstacle(&old.scene, before, reach));
-                obstacles.extend(obstacle(&next.scene, after, reach));
-            }
-        }
+        let Moved { has_moved, obstacles } = Moved::between(&old.scene, &next.scene);
         if obstacles.is_empty() {
             return;
         }

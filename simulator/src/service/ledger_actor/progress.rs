@@ -13,6 +13,7 @@ use std::{
 pub(super) struct Placed {
     records: Arc<[PatchRecord]>,
     geometry: Arc<Geometry>,
+    exposed: Arc<[f32]>,
     places: u64,
     placements: u64,
 }
@@ -91,21 +92,25 @@ impl Progress {
         let records = match &last {
             Some(last) if last.places == self.places => Arc::clone(&last.records),
             Some(last) if last.placements == self.placements => {
-                let moved = |t| last.geometry.triangle(t) != scene.geometry.triangle(t);
-                let is_moved = placement.vsls.iter().any(|vsl| moved(vsl.triangle));
-                if is_moved {
+                let differs = |index: usize| {
+                    let triangle = placement.vsls[index].triangle;
+                    last.geometry.triangle(triangle) != scene.geometry.triangle(triangle)
+                        || last.exposed[index] != self.simulation.exposed[index]
+                };
+                if (0..placement.vsls.len()).any(differs) {
                     let mut records = last.records.to_vec();
-                    records::write_patches(&mut records, scene, placement, |vsl| moved(vsl.triangle));
+                    records::write_patches(&mut records, &self.simulation, differs);
                     records.into()
                 } else {
                     Arc::clone(&last.records)
                 }
             }
-            _ => records::patch_records(scene, placement).into(),
+            _ => records::patch_records(&self.simulation).into(),
         };
         let placed = Placed {
             records: Arc::clone(&records),
             geometry: Arc::clone(&scene.geometry),
+            exposed: Arc::clone(&self.simulation.exposed),
             places: self.places,
             placements: self.placements,
         };
