@@ -22,6 +22,8 @@ pub(crate) struct Part<'a> {
     pub(crate) sides: Sides,
     pub(crate) mesh: Mesh,
     pub(crate) placement: Placement,
+    /// Whether it is one of several of a file, and may be left out.
+    pub(crate) is_imported: bool,
     pub(crate) emitter: Option<Emitter>,
 }
 
@@ -106,8 +108,9 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
     let mut poses = Vec::with_capacity(parts.len());
     let mut emitters = Vec::new();
     let mut notices = Vec::new();
+    let number = parts.len();
     for (index, part) in parts.into_iter().enumerate() {
-        let id = ObjectId(index as u32);
+        let id = ObjectId(objects.len() as u32);
         let first_triangle = soup.triangles.len() as u32;
         if soup.vertices.len() + part.mesh.vertices.len() > MAX_ELEMENTS
             || first_triangle as usize + part.mesh.triangles.len() > MAX_ELEMENTS
@@ -119,10 +122,18 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             ));
         }
         let pose = Pose::new(&part.placement, origin);
+        let first_vertex = soup.vertices.len();
         let rest = soup.push_vertices(&part, &pose)?;
         let dropped = soup.push_triangles(&part, &rest, id);
         let last_triangle = soup.triangles.len() as u32;
         if last_triangle == first_triangle {
+            let is_all = objects.is_empty() && index + 1 == number;
+            if part.is_imported && !is_all {
+                soup.vertices.truncate(first_vertex);
+                soup.rest_vertices.truncate(first_vertex);
+                notices.push(format!("object \"{}\": no triangle has an area; it was left out", part.name));
+                continue;
+            }
             return Err(part.field.invalid(
                 format!("{dropped} triangles, none with an area (object \"{}\")", part.name),
                 "a mesh with an area",

@@ -103,7 +103,7 @@ pub enum SceneError {
     /// An asset that is nowhere.
     #[error(
         "{place}: found no file \"{asset}\"; looked at {}; set PHOTONSTREAM_SCENES to the folder that holds the scenes, \
-         or put the file into assets/",
+         or put the file into assets/ (README.md, \"Scenes\", says where to get it)",
         list(looked)
     )]
     AssetMissing {

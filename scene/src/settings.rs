@@ -1,7 +1,7 @@
 //! Gathers the validated settings of simulation and rendering, with their defaults.
 
 use crate::{
-    config::{AnimatedProperty, Interpolation, Repeat},
+    config::{AnimatedProperty, Interpolation, Repeat, UpAxis},
     scene::Sides,
 };
 use photonstream_shading::{Kernel, tone::ToneMap};
@@ -174,6 +174,7 @@ macro_rules! named {
     };
 }
 
+named!(UpAxis, "axis", Y = "y", Z = "z");
 named!(Sides, "sides", Front = "front", Back = "back", Both = "both");
 named!(
     AnimatedProperty,

@@ -260,7 +260,7 @@ fn combinations_without_a_meaning_are_explained() {
     check(
         "sphere = { radius_m = 1, segments = 8 }",
         "sphere = { radius_m = 1 }\nbox = { size_m = [1, 1, 1] }",
-        ":9:9: object.ball: found box and sphere, expected exactly one of quad, box, sphere, torus-knot, obj",
+        ":9:9: object.ball: found box and sphere, expected exactly one of quad, box, sphere, torus-knot, obj, ply, gltf",
     );
     check(
         "sphere = { radius_m = 1, segments = 8 }",
@@ -352,7 +352,8 @@ fn a_missing_asset_says_where_it_was_looked_for() {
     assert_eq!(
         error.to_string(),
         "x.toml:11:16: object.ball.obj.path: found no file \"no/where.obj\"; looked at /scenes/no/where.obj, \
-         assets/no/where.obj; set PHOTONSTREAM_SCENES to the folder that holds the scenes, or put the file into assets/"
+         assets/no/where.obj; set PHOTONSTREAM_SCENES to the folder that holds the scenes, or put the file into assets/ \
+         (README.md, \"Scenes\", says where to get it)"
     );
     let absolute = text.replace("no/where.obj", "/no/where.obj");
     let error =

@@ -214,7 +214,15 @@ fn odd_materials_are_noticed() {
         "{:?}",
         scene.notices
     );
-    assert!(scene.notices.iter().any(|n| n.contains("textures are not supported yet")));
+    // The texture is not there.
+    assert!(
+        scene
+            .notices
+            .iter()
+            .any(|n| n.contains("a.png cannot be read (") && n.ends_with("; Kd is used alone")),
+        "{:?}",
+        scene.notices
+    );
     let scene = Files::new(OBJ, &MTL.replace("0.7 0.6 0.5", "0.4 # grey")).scene("", "");
     assert_eq!(scene.albedo(scene.object("it/floor/white").unwrap()), Vec3::splat(0.4));
     let scene = Files::new("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "").scene("", "");

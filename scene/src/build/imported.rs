@@ -1,12 +1,15 @@
-//! Turns an object that imports an OBJ file into one part for each group and material of the file.
+//! Turns an object that imports an OBJ or glTF file into one part for each group and material of the file.
 
-use super::{Inputs, materials::Materials};
+use super::{Inputs, imported_lights, materials::Materials};
 use crate::{
     bake::{Emitter, EmitterFace, Part, Strength},
-    config::{Field, ObjectConfig},
+    config::{Field, GltfConfig, ObjConfig, ObjectConfig},
     error::{SceneError, nearest},
-    import::{AssetRoots, Group, Import, ImportedMaterial, load_obj},
+    import::{
+        AssetRoots, Frame, Group, Import, ImportedMaterial, LeftOut, Loaded, Terms, load_gltf, load_obj,
+    },
     placement::Placement,
+    primitives::Mesh,
     scene::Sides,
 };
 use glam::DVec3;
@@ -18,6 +21,9 @@ use std::{
 /// Albedo of imported faces without a material.
 const DEFAULT_ALBEDO: f64 = 0.5;
 
+/// Most emitting faces of an import: each is a light of its own. A triangle is a face, and so is a parallelogram.
+const MAX_EMITTING_FACES: usize = 1024;
+
 /// What importing one object needs and fills.
 pub(super) struct Context<'c, 'a> {
     pub(super) field: &'c Field<'a>,
@@ -27,70 +33,136 @@ pub(super) struct Context<'c, 'a> {
     pub(super) notices: &'c mut Vec<String>,
 }
 
+/// The table of an object that names a file of several objects.
+struct Table<'c, 'a> {
+    path: &'c str,
+    exclude: &'c [String],
+    frame: Frame,
+    field: Field<'a>,
+    load: fn(&Path, Frame, &[String]) -> Loaded,
+}
+
+fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
+    if let Some(ObjConfig { path, up_axis, unit_m, exclude }) = &mut object.obj {
+        let field = field.key("obj");
+        let frame = Frame::resolve(up_axis, unit_m, &field)?;
+        let exclude = exclude.get_or_insert_default();
+        return Ok(Table { path, exclude, frame, field, load: |path, frame, _| load_obj(path, frame) });
+    }
+    let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
+    let GltfConfig { path, up_axis, unit_m, exclude } = gltf;
+    let field = field.key("gltf");
+    let frame = Frame::resolve(up_axis, unit_m, &field)?;
+    Ok(Table { path, exclude: exclude.get_or_insert_default(), frame, field, load: load_gltf })
+}
+
+/// The file of an asset, and its absolute path as text.
+pub(super) fn find(
+    path: &str,
+    field: &Field<'_>,
+    roots: &AssetRoots,
+) -> Result<(PathBuf, String), SceneError> {
+    let file = roots.find(Path::new(path)).map_err(|looked| SceneError::AssetMissing {
+        place: field.place(),
+        asset: path.to_owned(),
+        looked,
+    })?;
+    match file.to_str().map(str::to_owned) {
+        Some(absolute) => Ok((file, absolute)),
+        None => Err(asset_error(field, file, "its path is not valid UTF-8".into(), "rename its folder")),
+    }
+}
+
+/// The error of an asset that cannot be used.
+pub(super) fn asset_error(field: &Field<'_>, asset: PathBuf, problem: String, remedy: &str) -> SceneError {
+    SceneError::Asset { place: field.place(), asset, problem, remedy: remedy.into() }
+}
+
 pub(super) fn read(
     name: &str,
     object: &mut ObjectConfig,
     placement: Placement,
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
-    let obj = object.obj.as_mut().expect("invariant: called for imports only");
-    let sides = object.sides.unwrap_or_default();
-    let field = context.field.key("obj");
+    let (sides, overriding) = (object.sides, object.material.clone());
+    let Table { path, exclude, frame, field, load } = table(object, context.field)?;
     let path_field = field.key("path");
-    let file = context.roots.find(Path::new(&obj.path)).map_err(|looked| SceneError::AssetMissing {
-        place: path_field.place(),
-        asset: obj.path.clone(),
-        looked,
-    })?;
-    let asset_error = |asset: PathBuf, problem: String, remedy: &str| SceneError::Asset {
-        place: path_field.place(),
-        asset,
-        problem,
-        remedy: remedy.into(),
-    };
-    let absolute = file.to_str().map(str::to_owned).ok_or_else(|| {
-        asset_error(file.clone(), "its path is not valid UTF-8".into(), "rename its folder")
-    })?;
-    let import = load_obj(&file)
+    let (file, absolute) = find(path, &path_field, context.roots)?;
+    let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
+    let import = load(&file, frame, exclude)
         .map_err(|(file, problem)| asset_error(file, problem, "export it anew, or remove the object"))?;
-    let overridden = object.material.is_some();
     if let Some(problem) = &import.material_problem {
-        if object.material.is_none() {
+        if overriding.is_none() {
             let remedy = "repair it, or give the object a `material`";
             return Err(asset_error(file, problem.clone(), remedy));
         }
         context.notices.push(format!("object \"{name}\": {problem}; its `material` is used instead"));
     }
-    let excluded = excluded(&import, obj.exclude.get_or_insert_default(), &field.key("exclude"))?;
+    let excluded = excluded(&import, exclude, &field.key("exclude"))?;
     context.inputs.files.extend(import.files.iter().cloned());
     context.inputs.contents.insert(name.to_owned(), (absolute, import.content));
+    let of_materials = if overriding.is_none() { import.material_notices.as_slice() } else { &[] };
+    let notices =
+        import.notices.iter().chain(of_materials).map(|notice| format!("object \"{name}\": {notice}"));
+    context.notices.extend(notices);
 
-    let mut parts = 0;
+    let mut parts = Vec::new();
     for ((group, material), content) in import.groups {
         if excluded.contains(&format!("{group}/{material}")) {
             continue;
         }
-        let surface = surface(name, &material, import.materials.get(&material), overridden, context.notices)
-            .map_err(|problem| asset_error(file.clone(), problem, "repair the material file"))?;
-        let part = part(
-            Source {
-                name,
-                group: &group,
-                material: &material,
-                override_material: object.material.as_deref(),
-            },
-            content,
-            surface,
-            (sides, placement),
-            context,
-        );
-        context.inputs.parts.insert(part.name.clone(), part);
-        parts += 1;
+        let imported = import.materials.get(&material);
+        let surface =
+            surface(name, &material, imported, (import.terms, overriding.is_some()), context.notices)
+                .map_err(|problem| asset_error(file.clone(), problem, "repair the material"))?;
+        let source =
+            Source { name, group: &group, material: &material, override_material: overriding.as_deref() };
+        parts.push(part(source, content, surface, (sides, placement), context));
     }
-    if parts == 0 {
+    if parts.is_empty() {
         return Err(asset_error(file, "no faces are left of it".into(), "check the file and `exclude`"));
     }
+    limit_emitters(&mut parts, context.notices);
+    context.inputs.parts.extend(parts.into_iter().map(|part| (part.name.clone(), part)));
+    for light in import.lights {
+        let name = format!("{name}/{}", light.node);
+        imported_lights::add(name, light, placement, context.field, context.inputs)?;
+    }
     Ok(())
+}
+
+/// Leaves an import the emitters of most power for each face, up to [`MAX_EMITTING_FACES`]; the others stay dark.
+fn limit_emitters(parts: &mut [Part<'_>], notices: &mut Vec<String>) {
+    let faces = |part: &Part<'_>| part.emitter.as_ref().map_or(0, |emitter| emitter.faces.len());
+    if parts.iter().map(faces).sum::<usize>() <= MAX_EMITTING_FACES {
+        return;
+    }
+    let power_of_face = |part: &Part<'_>| {
+        let Some(Emitter { strength: Strength::Radiance(radiance), .. }) = part.emitter else { return 0.0 };
+        let Mesh { vertices, triangles } = &part.mesh;
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| vertices[i as usize]);
+            (b - a).cross(c - a).length()
+        };
+        radiance.element_sum() * triangles.iter().map(area).sum::<f64>() / faces(part) as f64
+    };
+    let mut order: Vec<usize> = (0..parts.len()).filter(|&i| faces(&parts[i]) > 0).collect();
+    order.sort_by(|&a, &b| power_of_face(&parts[b]).total_cmp(&power_of_face(&parts[a])));
+    let mut left = MAX_EMITTING_FACES;
+    for index in order {
+        let part = &mut parts[index];
+        let count = faces(part);
+        if count <= left {
+            left -= count;
+            continue;
+        }
+        part.emitter = None;
+        notices.push(format!(
+            "object \"{}\": its {count} emitting faces stay dark: an import has at most {MAX_EMITTING_FACES}, those of most \
+             power first",
+            part.name
+        ));
+    }
 }
 
 /// The names that a part of an import is made from.
@@ -105,12 +177,13 @@ fn part<'a>(
     source: Source<'_>,
     content: Group,
     surface: ImportedMaterial,
-    (sides, placement): (Sides, Placement),
+    (sides, placement): (Option<Sides>, Placement),
     context: &mut Context<'_, 'a>,
 ) -> Part<'a> {
     let Source { name, group, material, override_material } = source;
     let part_name = format!("{name}/{group}/{material}");
     let Group { mut mesh, mut faces } = content;
+    let sides = sides.unwrap_or(if surface.two_sided { Sides::Both } else { Sides::Front });
     let mut part_sides = sides;
     let emits = surface.radiance != DVec3::ZERO;
     if emits && sides == Sides::Back {
@@ -139,6 +212,7 @@ fn part<'a>(
         sides: part_sides,
         mesh,
         placement,
+        is_imported: true,
         emitter: emits.then_some(Emitter { strength: Strength::Radiance(surface.radiance), faces }),
     }
 }
@@ -148,7 +222,7 @@ fn surface(
     object: &str,
     name: &str,
     material: Option<&ImportedMaterial>,
-    overridden: bool,
+    (terms, overridden): (Terms, bool),
     notices: &mut Vec<String>,
 ) -> Result<ImportedMaterial, String> {
     let mut note = |what: String| {
@@ -164,29 +238,26 @@ fn surface(
         return Ok(ImportedMaterial {
             albedo: DVec3::splat(DEFAULT_ALBEDO),
             radiance: DVec3::ZERO,
-            textured: false,
+            two_sided: false,
         });
     };
     let mut surface = material.clone();
     if !surface.albedo.is_finite() || surface.albedo.min_element() < 0.0 {
         return Err(format!(
-            "material \"{name}\": found Kd {}, expected numbers from 0 to 1",
-            surface.albedo
+            "material \"{name}\": found {} {}, expected numbers from 0 to 1",
+            terms.albedo, surface.albedo
         ));
     }
     let radiance_max = surface.radiance.max_element();
     if !surface.radiance.is_finite() || surface.radiance.min_element() < 0.0 || radiance_max > 1e12 {
         return Err(format!(
-            "material \"{name}\": found Ke {}, expected numbers from 0 to 1e12",
-            surface.radiance
+            "material \"{name}\": found {} {}, expected numbers from 0 to 1e12",
+            terms.radiance, surface.radiance
         ));
     }
     if surface.albedo.max_element() > 1.0 {
-        note(format!("Kd {} is brought down to at most 1", surface.albedo));
+        note(format!("{} {} is brought down to at most 1", terms.albedo, surface.albedo));
         surface.albedo = surface.albedo.min(DVec3::ONE);
-    }
-    if surface.textured {
-        note("textures are not supported yet; Kd is used alone".into());
     }
     Ok(surface)
 }
@@ -195,8 +266,8 @@ fn surface(
 fn excluded(import: &Import, names: &[String], field: &Field<'_>) -> Result<BTreeSet<String>, SceneError> {
     let mut excluded = BTreeSet::new();
     for name in names {
-        let mut known = BTreeSet::new();
-        let mut matched = false;
+        let mut known: BTreeSet<String> = import.nodes.keys().cloned().collect();
+        let mut matched = import.nodes.get(name) == Some(&LeftOut(true));
         for (group, material) in import.groups.keys() {
             let pair = format!("{group}/{material}");
             if name == group || name == material || *name == pair {
@@ -209,7 +280,11 @@ fn excluded(import: &Import, names: &[String], field: &Field<'_>) -> Result<BTre
         if !matched {
             return Err(SceneError::UnknownName {
                 place: field.place(),
-                kind: "group or material of the file",
+                kind: if import.nodes.is_empty() {
+                    "group or material of the file"
+                } else {
+                    "node or material of the file"
+                },
                 found: name.clone(),
                 nearest: nearest(name, known.iter().map(String::as_str)),
                 known: known.into_iter().collect(),

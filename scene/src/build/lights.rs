@@ -81,6 +81,7 @@ pub(super) fn read<'a>(
             continue;
         };
         inputs.lights.insert(name.clone(), plain);
+        inputs.written.insert(name.clone(), light.clone());
     }
     Ok(())
 }
@@ -204,6 +205,7 @@ fn read_rectangle<'a>(
         sides: Sides::Front,
         mesh,
         placement,
+        is_imported: false,
         emitter: Some(Emitter {
             strength: Strength::Power(power),
             faces: vec![EmitterFace::Parallelogram([0, 1, 3])],

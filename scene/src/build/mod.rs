@@ -2,6 +2,7 @@
 
 mod camera;
 mod imported;
+mod imported_lights;
 pub(crate) mod lights;
 mod materials;
 mod objects;
@@ -74,6 +75,7 @@ impl SceneConfig {
         let mut inputs = Inputs {
             parts: BTreeMap::new(),
             lights: BTreeMap::new(),
+            written: BTreeMap::new(),
             contents: BTreeMap::new(),
             files: Vec::new(),
         };
@@ -101,7 +103,7 @@ impl SceneConfig {
         let materials = materials.into_list();
         let baked = bake::bake(parts, origin_m, &materials)?;
         notices.extend(baked.notices.iter().cloned());
-        let (baked, lights) = join_lights(baked, inputs.lights, &self.light, origin_m);
+        let (baked, lights) = join_lights(baked, inputs.lights, inputs.written, origin_m);
         let Baked { geometry, objects, rest_meshes, poses, bounds, .. } = baked;
 
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
@@ -141,6 +143,8 @@ struct Inputs<'a> {
     parts: BTreeMap<String, Part<'a>>,
     /// Lights without a surface, in the config's coordinates.
     lights: BTreeMap<String, lights::PlainLight>,
+    /// What the config says of them, or would say of those of an imported file.
+    written: BTreeMap<String, LightConfig>,
     /// Absolute path and hash of the asset of each importing object.
     contents: BTreeMap<String, (String, blake3::Hash)>,
 }
@@ -153,13 +157,13 @@ fn stem(document: &Document) -> String {
 fn join_lights(
     mut baked: Baked,
     plain: BTreeMap<String, lights::PlainLight>,
-    written: &BTreeMap<String, LightConfig>,
+    mut written: BTreeMap<String, LightConfig>,
     origin: DVec3,
 ) -> (Baked, Vec<SceneLight>) {
     let mut lights: Vec<SceneLight> = plain
         .into_iter()
         .map(|(name, light)| SceneLight {
-            written: written.get(&name).cloned(),
+            written: written.remove(&name),
             name,
             light: light.around(origin),
             enabled: true,
@@ -203,8 +207,8 @@ pub(crate) fn area_light(shape: LightShape, strength: Strength) -> Light {
 fn resolve(config: &mut SceneConfig, contents: &BTreeMap<String, (String, blake3::Hash)>) -> (Arc<str>, u64) {
     let mut text_with = |path_of: &dyn Fn(&(String, blake3::Hash)) -> String| {
         for (name, object) in &mut config.object {
-            if let (Some(obj), Some(content)) = (&mut object.obj, contents.get(name)) {
-                obj.path = path_of(content);
+            if let (Some(path), Some(content)) = (object.asset_path(), contents.get(name)) {
+                *path = path_of(content);
             }
         }
         toml::to_string(config).expect("invariant: a validated config has only values that TOML can hold")

@@ -7,9 +7,9 @@ use super::{
 };
 use crate::{
     bake::Part,
-    config::{BoxConfig, Field, ObjectConfig, QuadConfig, SphereConfig, TorusKnotConfig, Vector},
+    config::{BoxConfig, Field, ObjectConfig, PlyConfig, QuadConfig, SphereConfig, TorusKnotConfig, Vector},
     error::SceneError,
-    import::AssetRoots,
+    import::{AssetRoots, Frame, read_file, read_ply},
     placement::Placement,
     primitives::{Mesh, TorusKnot, sphere, torus_knot},
     scene::Sides,
@@ -30,30 +30,49 @@ pub(super) fn read<'a>(
         if let Some(material) = &object.material {
             materials.check(material, &field.key("material"))?;
         }
-        let sides = *object.sides.get_or_insert(Sides::Front);
+        if object.gltf.is_none() {
+            // A glTF file says itself which of its sides reflect.
+            object.sides.get_or_insert(Sides::Front);
+        }
         let ObjectConfig { position_m, rotation_deg, scale, .. } = object;
         let placement = Placement::resolve(position_m, rotation_deg, scale, &field)?;
-        let Some(mesh) = primitive(object, &field)? else {
+        let mesh = match primitive(object, &field)? {
+            Some(mesh) => Some(mesh),
+            None => imported_mesh(name, object, &field, roots, inputs)?,
+        };
+        let Some(mesh) = mesh else {
             let mut context = imported::Context { field: &field, roots, materials, inputs, notices };
             imported::read(name, object, placement, &mut context)?;
             continue;
         };
         let material = object.material.clone().ok_or_else(|| field.missing("material"))?;
-        let part = Part { name: name.clone(), field, material, sides, mesh, placement, emitter: None };
+        let sides = object.sides.unwrap_or_default();
+        let part = Part {
+            name: name.clone(),
+            field,
+            material,
+            sides,
+            mesh,
+            placement,
+            is_imported: false,
+            emitter: None,
+        };
         inputs.parts.insert(name.clone(), part);
     }
     Ok(())
 }
 
-/// The mesh of an object's shape; `None` for an import.
+/// The mesh of an object's shape; `None` for an import, of which there is one then.
 fn primitive(object: &mut ObjectConfig, field: &Field<'_>) -> Result<Option<Mesh>, SceneError> {
-    let ObjectConfig { quad, cuboid, sphere, torus_knot, obj, .. } = object;
+    let ObjectConfig { quad, cuboid, sphere, torus_knot, obj, ply, gltf, .. } = object;
     let given = [
         ("quad", quad.is_some()),
         ("box", cuboid.is_some()),
         ("sphere", sphere.is_some()),
         ("torus-knot", torus_knot.is_some()),
         ("obj", obj.is_some()),
+        ("ply", ply.is_some()),
+        ("gltf", gltf.is_some()),
     ];
     if given.iter().filter(|(_, given)| *given).count() != 1 {
         return Err(not_one_of(field, &given));
@@ -74,6 +93,31 @@ fn primitive(object: &mut ObjectConfig, field: &Field<'_>) -> Result<Option<Mesh
         return read_torus_knot(shape, &field.key("torus-knot")).map(Some);
     }
     Ok(None)
+}
+
+/// The mesh of an object that imports a file of one; `None` for other imports.
+fn imported_mesh(
+    name: &str,
+    object: &mut ObjectConfig,
+    field: &Field<'_>,
+    roots: &AssetRoots,
+    inputs: &mut Inputs<'_>,
+) -> Result<Option<Mesh>, SceneError> {
+    let Some(PlyConfig { path, up_axis, unit_m }) = &mut object.ply else { return Ok(None) };
+    let field = field.key("ply");
+    let frame = Frame::resolve(up_axis, unit_m, &field)?;
+    let path_field = field.key("path");
+    let (file, absolute) = imported::find(path, &path_field, roots)?;
+    let mesh = read_file(&file).and_then(|bytes| {
+        let content = blake3::hash(&bytes);
+        inputs.contents.insert(name.to_owned(), (absolute, content));
+        read_ply(&bytes, frame)
+    });
+    let mesh = mesh.map_err(|problem| {
+        imported::asset_error(&path_field, file.clone(), problem, "export it anew, or remove the object")
+    })?;
+    inputs.files.push(file);
+    Ok(Some(mesh))
 }
 
 fn read_sphere(shape: &mut SphereConfig, field: &Field<'_>) -> Result<Mesh, SceneError> {

@@ -28,7 +28,19 @@ fn every_key() -> SceneConfig {
             segments: Some(1),
             tube_segments: Some(1),
         }),
-        obj: Some(ObjConfig { path: "p".into(), exclude: Some(vec!["x".into()]) }),
+        obj: Some(ObjConfig {
+            path: "p".into(),
+            up_axis: Some(UpAxis::Z),
+            unit_m: Some(1.0),
+            exclude: Some(vec!["x".into()]),
+        }),
+        ply: Some(PlyConfig { path: "p".into(), up_axis: Some(UpAxis::Z), unit_m: Some(1.0) }),
+        gltf: Some(GltfConfig {
+            path: "p".into(),
+            up_axis: Some(UpAxis::Z),
+            unit_m: Some(1.0),
+            exclude: Some(vec!["x".into()]),
+        }),
     };
     let light = LightConfig {
         power_w: c,
@@ -142,12 +154,24 @@ fn the_table_lists_exactly_the_keys_that_exist() {
 fn documented_defaults_are_those_of_a_resolved_scene() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    std::fs::write(folder.path().join("a.ply"), ply).unwrap();
+    // Positions (0, 0, 0), (1, 0, 0), (0, 1, 0).
+    let gltf = r#"{ "asset": { "version": "2.0" }, "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36, "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
+    std::fs::write(folder.path().join("a.gltf"), gltf).unwrap();
     let text = r#"
         camera = { position_m = [0, 0, 5], target_m = [0, 0, 0], vertical_fov_deg = 40 }
         material.m.albedo = 0.5
         object.a = { material = "m", sphere = { radius_m = 1 } }
         object.b = { material = "m", torus-knot = { radius_m = 1, tube_radius_m = 0.1 } }
         object.c = { obj = { path = "a.obj" } }
+        object.p = { material = "m", ply = { path = "a.ply" } }
+        object.g = { gltf = { path = "a.gltf" } }
         animation = [
             { light = "f", property = "position_m", orbit = { centre_m = [0, 1, 0], axis = [0, 1, 0], radius_m = 1, period_s = 1 } },
             { object = "b", property = "position_m", times_s = [0], values = [[0, 0, 0]] },

@@ -4,6 +4,7 @@ mod animation;
 mod decode;
 mod document;
 mod domain;
+mod imports;
 #[cfg(test)]
 mod keys;
 mod values;
@@ -11,6 +12,7 @@ mod values;
 pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
 pub use domain::{MAX_LENGTH_M, MAX_POWER};
+pub use imports::{GltfConfig, ObjConfig, PlyConfig, UpAxis};
 pub use values::{OneOrThree, Vector};
 
 use crate::{
@@ -81,7 +83,7 @@ pub struct MaterialConfig {
 pub struct ObjectConfig {
     /// Name of its material; an import may go without and keep its own.
     pub material: Option<String>,
-    /// Which sides reflect; default front.
+    /// Which sides reflect; default front, for glTF as the file says.
     #[serde(default, with = "values::by_name")]
     pub sides: Option<Sides>,
     /// Where the shape's own origin is put, m.
@@ -102,6 +104,10 @@ pub struct ObjectConfig {
     pub torus_knot: Option<TorusKnotConfig>,
     /// Meshes of a Wavefront OBJ file.
     pub obj: Option<ObjConfig>,
+    /// The mesh of a PLY file.
+    pub ply: Option<PlyConfig>,
+    /// Meshes and lights of a glTF file.
+    pub gltf: Option<GltfConfig>,
 }
 
 /// `quad`: a parallelogram; its front looks along `edge_u_m × edge_v_m`.
@@ -152,16 +158,6 @@ pub struct TorusKnotConfig {
     pub segments: Option<u32>,
     /// Divisions around the tube.
     pub tube_segments: Option<u32>,
-}
-
-/// `obj`: one object for each pair of group and material of an OBJ file, called `NAME/group/material`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ObjConfig {
-    /// The file.
-    pub path: String,
-    /// Groups, materials or `group/material` pairs to leave out.
-    pub exclude: Option<Vec<String>>,
 }
 
 /// `[light.NAME]`: a light source. Exactly one shape.

@@ -125,6 +125,7 @@ impl_named!(
     super::AnimatedProperty,
     super::Interpolation,
     super::Repeat,
+    super::UpAxis,
     crate::scene::Sides,
     crate::settings::RangeCulling,
     crate::settings::Sampling,

@@ -1,7 +1,104 @@
-//! Turns asset files into meshes and materials.
+//! Turns asset files into meshes, materials and lights.
 
 mod assets;
+mod beside;
+mod frame;
+mod gltf;
 mod obj;
+mod ply;
+mod polygons;
+mod texture;
 
 pub use assets::AssetRoots;
-pub(crate) use obj::{Group, Import, ImportedMaterial, load_obj};
+pub(crate) use beside::read as read_file;
+pub(crate) use frame::Frame;
+pub(crate) use gltf::load_gltf;
+pub(crate) use obj::{NO_MATERIAL, load_obj};
+pub(crate) use ply::read_ply;
+
+use crate::{bake::EmitterFace, primitives::Mesh};
+use glam::DVec3;
+use std::{collections::BTreeMap, path::PathBuf};
+
+/// Most triangles of one imported file, instances counted each: 2²⁵.
+pub(crate) const MAX_TRIANGLES: usize = 1 << 25;
+
+/// An import, or a sentence on what is wrong with the file at the path.
+pub(crate) type Loaded = Result<Import, (PathBuf, String)>;
+
+/// What a file holds that has several objects.
+#[derive(Debug)]
+pub(crate) struct Import {
+    /// What the file format calls reflectance and emission.
+    pub(crate) terms: Terms,
+    /// Meshes by (group, material).
+    pub(crate) groups: BTreeMap<(String, String), Group>,
+    /// Materials by name.
+    pub(crate) materials: BTreeMap<String, ImportedMaterial>,
+    /// Lights without a surface.
+    pub(crate) lights: Vec<ImportedLight>,
+    /// What could not be read of the material files; faces may lack their material.
+    pub(crate) material_problem: Option<String>,
+    /// Further names that can be left out, and which of them were.
+    pub(crate) nodes: BTreeMap<String, LeftOut>,
+    /// What is passed over of the file, one sentence each.
+    pub(crate) notices: Vec<String>,
+    /// The same of its materials, without interest where they are replaced.
+    pub(crate) material_notices: Vec<String>,
+    /// All files read, and files that it names and that are not there.
+    pub(crate) files: Vec<PathBuf>,
+    /// Hash of the content of all files read.
+    pub(crate) content: blake3::Hash,
+}
+
+/// Whether a node was left out by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LeftOut(pub(crate) bool);
+
+/// Names of material properties in a file format, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Terms {
+    pub(crate) albedo: &'static str,
+    pub(crate) radiance: &'static str,
+}
+
+/// The faces of one group and material.
+#[derive(Debug, Default)]
+pub(crate) struct Group {
+    pub(crate) mesh: Mesh,
+    /// The same surface as light sources would cover it.
+    pub(crate) faces: Vec<EmitterFace>,
+}
+
+/// Reflectance and emission of a material of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ImportedMaterial {
+    /// Share of light reflected, times the mean of its texture; white where the file gives none.
+    pub(crate) albedo: DVec3,
+    /// Emitted radiance, W m⁻² sr⁻¹.
+    pub(crate) radiance: DVec3,
+    /// Whether both sides reflect.
+    pub(crate) two_sided: bool,
+}
+
+/// A light without a surface, in the file's own coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ImportedLight {
+    /// The node that bears it.
+    pub(crate) node: String,
+    pub(crate) position: DVec3,
+    /// The way it shines, of any length but 0.
+    pub(crate) direction: DVec3,
+    pub(crate) kind: ImportedLightKind,
+}
+
+/// What kind of light a file describes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ImportedLightKind {
+    /// W.
+    Point { power: DVec3 },
+    /// W, and half opening angles in degrees.
+    Spot { power: DVec3, inner_deg: f64, outer_deg: f64 },
+    /// W m⁻².
+    Directional { irradiance: DVec3 },
+}

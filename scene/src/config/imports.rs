@@ -1,0 +1,66 @@
+//! Gathers what a scene file says of the files that objects are imported from.
+
+use super::{ObjectConfig, values};
+use serde::{Deserialize, Serialize};
+
+/// Which axis of a file points up. The scene's is +Y.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +Y, as in the scene: nothing is turned.
+    #[default]
+    Y,
+    /// +Z: the file's (x, y, z) become (x, z, −y).
+    Z,
+}
+
+/// `obj`: one object for each pair of group and material of an OBJ file, called `NAME/group/material`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjConfig {
+    /// The file.
+    pub path: String,
+    /// The file's axis that points up; default y.
+    #[serde(default, with = "values::by_name")]
+    pub up_axis: Option<UpAxis>,
+    /// Metres in a unit of the file; default 1.
+    pub unit_m: Option<f64>,
+    /// Groups, materials or `group/material` pairs to leave out.
+    pub exclude: Option<Vec<String>>,
+}
+
+/// `ply`: the faces of a PLY file as one object.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlyConfig {
+    /// The file.
+    pub path: String,
+    /// The file's axis that points up; default y.
+    #[serde(default, with = "values::by_name")]
+    pub up_axis: Option<UpAxis>,
+    /// Metres in a unit of the file; default 1.
+    pub unit_m: Option<f64>,
+}
+
+/// `gltf`: one object for each pair of node and material of a glTF or GLB file, called `NAME/node/material`, and a light
+/// `NAME/node` for each node with one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GltfConfig {
+    /// The file.
+    pub path: String,
+    /// The file's axis that points up; default y.
+    #[serde(default, with = "values::by_name")]
+    pub up_axis: Option<UpAxis>,
+    /// Metres in a unit of the file; default 1.
+    pub unit_m: Option<f64>,
+    /// Nodes (with all below them), materials or `node/material` pairs to leave out.
+    pub exclude: Option<Vec<String>>,
+}
+
+impl ObjectConfig {
+    /// The path of the file that the object is imported from.
+    pub(crate) fn asset_path(&mut self) -> Option<&mut String> {
+        let obj = self.obj.as_mut().map(|obj| &mut obj.path);
+        obj.or(self.ply.as_mut().map(|ply| &mut ply.path)).or(self.gltf.as_mut().map(|gltf| &mut gltf.path))
+    }
+}

@@ -1,0 +1,88 @@
+//! Turns a glTF 2.0 or GLB file into meshes by node and material, reflectances, emitters and lights.
+
+mod accessor;
+mod buffers;
+mod container;
+mod lights;
+mod materials;
+mod names;
+mod nodes;
+mod primitive;
+mod unmodelled;
+
+use super::{
+    Frame, Group, Import, Loaded, MAX_TRIANGLES, Terms,
+    beside::{self, Beside},
+};
+use accessor::Accessors;
+use container::Container;
+use glam::DVec3;
+use materials::Materials;
+use std::{collections::BTreeMap, path::Path};
+
+/// Lumens of a watt, which candela, lux and nits of a file are divided by. Source: the definition of the candela (SI).
+const LUMENS_PER_WATT: f64 = 683.0;
+
+/// Reads a glTF or GLB file, and the buffers and pictures it names, without the nodes that `exclude` names and what is
+/// below them.
+///
+/// Memory is bounded by a constant times the size of the files, and by [`MAX_TRIANGLES`].
+///
+/// # Errors
+/// A sentence on what is wrong with the file at the returned path.
+///
+/// Source: Khronos Group, *glTF 2.0 Specification*, 2021.
+pub(crate) fn load_gltf(path: &Path, frame: Frame, exclude: &[String]) -> Loaded {
+    let bytes = beside::read(path).map_err(|problem| (path.to_owned(), problem))?;
+    let beside = Beside::new(path, &bytes);
+    load(&bytes, beside, frame, exclude).map_err(|problem| (path.to_owned(), problem))
+}
+
+fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) -> Result<Import, String> {
+    let Container { root, bin } = container::parse(bytes)?;
+    let mut notices = unmodelled::check(&root)?;
+    let buffers = buffers::load(&root, bin, &mut beside)?;
+    let accessors = Accessors { root: &root, buffers: &buffers };
+    let placed = nodes::place(&root, exclude)?;
+
+    let mut materials = Materials::new(&root);
+    let mut groups: BTreeMap<(String, String), Group> = BTreeMap::new();
+    let mut left = MAX_TRIANGLES;
+    let mut points_and_lines = 0;
+    for node in &placed.nodes {
+        let Some(mesh) = root.nodes[node.index].mesh else { continue };
+        let is_mirrored = node.world.matrix3.determinant() < 0.0;
+        let place = |point: DVec3| frame.apply(node.world.transform_point3(point));
+        for (number, primitive) in root.meshes[mesh.value()].primitives.iter().enumerate() {
+            let at = |problem| format!("node \"{}\", primitive {number}: {problem}", node.name);
+            let Some(mut surface) = primitive::read(primitive, &accessors, left).map_err(at)? else {
+                points_and_lines += 1;
+                continue;
+            };
+            left -= surface.read;
+            if is_mirrored {
+                surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            surface.vertices.iter_mut().for_each(|v| *v = place(*v));
+            let (material, emits) = materials.of(primitive, &accessors, &mut beside)?;
+            primitive::append(groups.entry((node.name.clone(), material)).or_default(), surface, emits);
+        }
+    }
+    groups.retain(|_, group| !group.mesh.triangles.is_empty());
+    if points_and_lines > 0 {
+        notices.push(format!("{points_and_lines} primitives of points or lines are passed over"));
+    }
+    let lights = lights::read(&root, &placed.nodes, frame, &mut notices)?;
+    Ok(Import {
+        terms: Terms { albedo: "baseColorFactor", radiance: "emissiveFactor" },
+        groups,
+        lights,
+        material_problem: None,
+        nodes: placed.names,
+        notices,
+        material_notices: materials.notices(),
+        materials: materials.read,
+        files: beside.files,
+        content: beside.hasher.finalize(),
+    })
+}

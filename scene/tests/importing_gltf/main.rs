@@ -1,0 +1,7 @@
+//! Checks imports of glTF files, one small file for each feature.
+#![allow(clippy::unwrap_used)]
+
+mod bad;
+mod files;
+mod geometry;
+mod surfaces;
