@@ -69,6 +69,11 @@ fn bad_files_are_explained() {
     );
     error(&[("/nodes", json!([{ "name": "square" }]))], "no faces are left of it");
 
+    let mut data = bytes();
+    data[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let uri = ("/buffers/0/uri", json!(data_uri(&data)));
+    error(&[uri], "node \"square\", primitive 0: a position is not finite: [NaN, NaN, NaN]");
+
     let whole = glb(&with(&[("/buffers/0", json!({ "byteLength": 72 }))]), &bytes());
     for length in 0..whole.len() {
         assert!(Files::of_bytes(&whole[..length]).build("", "").is_err(), "{length} bytes");

@@ -63,7 +63,12 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
             if is_mirrored {
                 surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            surface.vertices.iter_mut().for_each(|v| *v = place(*v));
+            for vertex in &mut surface.vertices {
+                *vertex = place(*vertex);
+                if !vertex.is_finite() {
+                    return Err(at(format!("a position is not finite: {vertex}")));
+                }
+            }
             let (material, emits) = materials.of(primitive, &accessors, &mut beside)?;
             primitive::append(groups.entry((node.name.clone(), material)).or_default(), surface, emits);
         }
