@@ -123,6 +123,12 @@ pub fn plan(base: &Point, effort: Effort, ways: &[Way]) -> Vec<Planned> {
             add(TIME, Point { vsls, pool, visibility, ..base.clone() });
         }
     }
+    // Discs are the fastest, for the shortest budgets.
+    for visibility in [Visibility::None, Visibility::Octahedral] {
+        for &(vsls, pool) in effort.pairs() {
+            add(TIME, Point { vsls, pool, visibility, kernel: Kernel::Disc, ..base.clone() });
+        }
+    }
     for &kernel in Kernel::ALL.iter() {
         for &vsls in effort.vsls() {
             add(VSLS, Point { vsls, kernel, ..base.clone() });

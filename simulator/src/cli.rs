@@ -7,7 +7,7 @@ use crate::{
     simulation::Simulation,
 };
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{Sampling, Scene, SceneConfig, StreamingSettings};
+use photonstream_scene::{Sampling, Scene, SceneConfig, SceneError, StreamingSettings};
 use photonstream_shading::distance_map::EDGES;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::{path::PathBuf, sync::Arc, time::Instant};
@@ -49,6 +49,9 @@ pub struct Overrides {
     /// Seed of placement and streaming
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Hold an animated scene at this moment, in seconds
+    #[arg(long, value_name = "SECONDS")]
+    pub time: Option<f64>,
     /// Texels along the edge of the virtual surface lights' distance maps, for visibility octahedral: 0 (none), 8, 16, 32,
     /// 64, or `auto` (32, fewer for more than 32 768 lights)
     #[arg(long, value_name = "PX")]
@@ -92,8 +95,15 @@ impl std::fmt::Display for MapEdge {
 }
 
 impl Overrides {
-    /// Writes what is given into `config`.
-    pub fn apply(&self, config: &mut SceneConfig) {
+    /// `config` with what is given.
+    ///
+    /// # Errors
+    /// If it is to be held at a moment, and has none such.
+    pub fn apply(&self, config: SceneConfig) -> Result<SceneConfig, SceneError> {
+        let mut config = match self.time {
+            Some(time_s) => config.at(time_s)?,
+            None => config,
+        };
         let streaming = &mut config.streaming;
         streaming.vsls = self.vsls.or(streaming.vsls);
         streaming.pool_paths = self.pool.or(streaming.pool_paths);
@@ -108,6 +118,7 @@ impl Overrides {
             }
             None => {}
         }
+        Ok(config)
     }
 
     /// As arguments for another process.
@@ -117,6 +128,7 @@ impl Overrides {
             arguments.extend(value.map(|value| format!("--{name}={value}")));
         };
         add("method", self.method.clone());
+        add("time", self.time.map(|t| t.to_string()));
         add("vsls", self.vsls.map(|v| v.to_string()));
         add("pool", self.pool.map(|v| v.to_string()));
         add("seed", self.seed.map(|v| v.to_string()));

@@ -145,7 +145,7 @@ mod tests {
     const BOX: &str = "[object.box]\nmaterial = \"m\"\nposition_m = [0.3, 0.5, -0.2]\nrotation_deg = [0, 25, 0]\n\
                        box = { size_m = [1.1, 1, 1.7] }\n";
 
-    fn on_floor<'a>(simulation: &'a Simulation) -> impl Iterator<Item = (&'a Vsl, f32)> {
+    fn on_floor(simulation: &Simulation) -> impl Iterator<Item = (&Vsl, f32)> {
         let floor = simulation.scene.object("floor").unwrap();
         let lights = simulation.placement.vsls.iter().zip(simulation.exposed.iter().copied());
         lights.filter(move |(vsl, _)| vsl.surface.object == floor)

@@ -33,8 +33,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
-    let mut config = SceneConfig::from_file(&args.config)?;
-    args.overrides.apply(&mut config);
+    let config = args.overrides.apply(SceneConfig::from_file(&args.config)?)?;
     let scene = Arc::new(config.build()?);
     let spinner = Spinner::start("bench");
     if args.dynamic {

@@ -31,6 +31,7 @@ Examples:
   photonstream render configs/cornell-box.toml --out box.png
   photonstream render configs/cornell-box.toml --out box.exr --vsls 4000 --size 400x300
   photonstream render configs/cornell-box.toml --out box.png --renderer wgpu --visibility ao --stats
+  photonstream render configs/cornell-ball.toml --out ball.png --time 2.5       an animated scene at 2.5 s (else at 0 s)
   photonstream render --channel demo --out light.png --show full,indirect,vsl
 
 JSON: { \"scene\", \"scene_hash\", \"pictures\": [paths], \"frame\", \"vsls\", \"photon_paths\", \"rays_per_s\", \"converged\",
@@ -153,7 +154,9 @@ impl Simulated<'_> {
         SceneConfig::from_file(self.config)?;
         let channel: ChannelName = format!("render-{}", std::process::id()).parse()?;
         let mut supervisor = Supervisor::new(ChildOutput::Aside)?;
-        let overrides = look.overrides(self.overrides);
+        let mut overrides = look.overrides(self.overrides);
+        // What moves without end never comes to rest.
+        overrides.time.get_or_insert(0.0);
         supervisor.start(simulator(self.config, &channel, &overrides, self.after, global))?;
         let frame = follow::converged_frame(&mut supervisor, &channel);
         supervisor.end();

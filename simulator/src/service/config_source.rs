@@ -57,9 +57,8 @@ impl ConfigSource {
         self.finish(SceneConfig::from_text(text, &self.path)?)
     }
 
-    fn finish(&self, mut config: SceneConfig) -> Result<Scene, SceneError> {
-        self.overrides.apply(&mut config);
-        config.build()
+    fn finish(&self, config: SceneConfig) -> Result<Scene, SceneError> {
+        self.overrides.apply(config)?.build()
     }
 
     /// The folder in which the file lies.

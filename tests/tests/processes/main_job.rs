@@ -97,3 +97,25 @@ fn one_simulation_serves_pictures_of_a_running_channel() {
     simulation.signal(rustix::process::Signal::INT);
     simulation.wait().expect(0, &[]);
 }
+
+/// A scene that moves for ever is rendered as it is at a moment: at its beginning unless told otherwise, and the same each
+/// time. With shadows of distance maps, which the simulator traces for that.
+#[test]
+fn what_moves_is_rendered_at_a_moment() {
+    let ground = Ground::new();
+    let scene = config("cornell-ball.toml");
+    let picture = |name: &str, more: &[&str]| {
+        let out = format!("{name}.exr");
+        let size = ["--size", "40x30", "--vsls", "60", "--pool", "2000", "--visibility", "octahedral"];
+        let arguments = ["render", scene.as_str(), "--out", out.as_str()];
+        let arguments: Vec<&str> = arguments.into_iter().chain(size).chain(more.iter().copied()).collect();
+        ground.run(&arguments).expect(0, &[]);
+        Film::read_exr(&ground.path(&out)).unwrap().layers()[0].pixels.clone()
+    };
+    let first = picture("first", &[]);
+    assert!(picture("again", &["--time", "0"]) == first);
+    let later = picture("later", &["--time", "2.5"]);
+    assert!(later != first && later == picture("later-again", &["--time", "2.5"]));
+    let text = std::fs::read_to_string(config("cornell-ball.toml")).unwrap();
+    assert!(text.contains("[[animation]]"));
+}
