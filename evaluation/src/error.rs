@@ -11,6 +11,12 @@ use std::{io, path::PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
+    /// Open Image Denoise failed.
+    #[error("Open Image Denoise: {reason}; evaluate with a build without the feature oidn")]
+    Denoise {
+        /// What it says.
+        reason: String,
+    },
     /// A scene.
     #[error(transparent)]
     Scene(#[from] SceneError),

@@ -207,7 +207,12 @@ mod tests {
         let has = |what: &dyn Fn(&Point) -> bool| planned.iter().any(|p| what(&p.point));
         assert!(Kernel::ALL.iter().all(|&k| has(&|p| p.kernel == k)));
         assert!(Visibility::ALL.iter().all(|&v| has(&|p| p.visibility == v)));
-        assert!(Method::ALL.iter().filter(|&&m| m != Method::PathTracing).all(|&m| has(&|p| p.method == m)));
+        assert!(
+            Method::ALL
+                .iter()
+                .filter(|&&m| !matches!(m, Method::PathTracing | Method::PathTracingDenoised))
+                .all(|&m| has(&|p| p.method == m))
+        );
         let drawn = |way: &Way| {
             has(&|p| {
                 p.method == Method::PhotonStreamingGpu

@@ -13,6 +13,8 @@ pub enum Method {
     PhotonStreamingGpu,
     /// Paths from the camera, until the time is over; the reference's own code.
     PathTracing,
+    /// The same, denoised by Intel Open Image Denoise with the albedo and the normals of the pixels' centres.
+    PathTracingDenoised,
     /// Random virtual point lights with shadow rays. Source: Keller, "Instant Radiosity", SIGGRAPH 1997.
     InstantRadiosity,
     /// The same, bounded: 1/(π (r² + c²)), c the radius of the disc that is a light's share of the surfaces.
@@ -23,10 +25,11 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::PhotonStreaming,
         Self::PhotonStreamingGpu,
         Self::PathTracing,
+        Self::PathTracingDenoised,
         Self::InstantRadiosity,
         Self::InstantRadiosityBounded,
         Self::PaperA,
@@ -38,6 +41,7 @@ impl Method {
             Self::PhotonStreaming => "photon-streaming",
             Self::PhotonStreamingGpu => "photon-streaming-gpu",
             Self::PathTracing => "path-tracing",
+            Self::PathTracingDenoised => "path-tracing-denoised",
             Self::InstantRadiosity => "instant-radiosity",
             Self::InstantRadiosityBounded => "instant-radiosity-bounded",
             Self::PaperA => "paper-a",
@@ -61,7 +65,7 @@ impl Method {
                 "threads",
                 "seed",
             ],
-            Self::PathTracing => &["spp", "threads", "seed"],
+            Self::PathTracing | Self::PathTracingDenoised => &["spp", "threads", "seed"],
             Self::InstantRadiosity | Self::InstantRadiosityBounded => {
                 &["vsls", "visibility", "light_samples", "threads", "seed"]
             }

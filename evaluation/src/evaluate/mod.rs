@@ -7,7 +7,7 @@ use crate::{
     device::{Offered, WITHOUT},
     hard_cases::{CLOSED_FORMS, SAMPLES, run as run_closed_form},
     machine::Machine,
-    methods::Bench,
+    methods::{Bench, denoised},
     plan::{self, Effort, Planned},
     point::Point,
     report::{self, SceneSheet},
@@ -106,16 +106,17 @@ pub fn evaluate(
 /// What no evaluation has.
 fn left_out() -> Vec<Skipped> {
     let skipped = |what: &str, why: &str| Skipped { what: what.into(), why: why.into() };
-    vec![
-        skipped(
+    let mut left_out = vec![skipped(
+        "HDR-FLIP",
+        "FLIP is measured on the tone-mapped picture: the library has the variant for displays alone",
+    )];
+    if !denoised::IS_BUILT_IN {
+        left_out.push(skipped(
             "path tracing with Open Image Denoise",
-            "no binding to the library is built in; the library was installed on none of the machines this was written on",
-        ),
-        skipped(
-            "HDR-FLIP",
-            "FLIP is measured on the tone-mapped picture: the library has the variant for displays alone",
-        ),
-    ]
+            "this build is without the feature oidn, which needs the library: cargo build --release --features oidn",
+        ));
+    }
+    left_out
 }
 
 fn scene(

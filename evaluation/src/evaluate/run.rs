@@ -5,7 +5,7 @@ use crate::{
     EvaluateError, command,
     device::{Offered, WITHOUT},
     flip::{Exposure, flip},
-    methods::{Bench, Shot},
+    methods::{Bench, Shot, denoised},
     metrics::compare,
     plan::{self, Effort, Planned},
     point::{Method, Point},
@@ -176,9 +176,22 @@ impl Run<'_, '_> {
         base: &Point,
         sheets: &mut [SceneSheet],
     ) -> Result<(), EvaluateError> {
+        self.paths_of(Method::PathTracing, base, sheets)?;
+        if denoised::IS_BUILT_IN {
+            self.paths_of(Method::PathTracingDenoised, base, sheets)?;
+        }
+        Ok(())
+    }
+
+    fn paths_of(
+        &mut self,
+        method: Method,
+        base: &Point,
+        sheets: &mut [SceneSheet],
+    ) -> Result<(), EvaluateError> {
         let mut spp = 2;
         loop {
-            let point = Point { method: Method::PathTracing, spp, ..base.clone() };
+            let point = Point { method, spp, ..base.clone() };
             (self.observer.progress)(0.6 + 0.02 * (spp as f64).log2().min(10.0), &point.to_string());
             let took = self.point(&Planned { sweeps: plan::TIME.into(), point }, sheets)?;
             // Half the samples of the reference would be compared with its noise.

@@ -1,5 +1,6 @@
 //! Turns a point into a picture and the time it takes: each method on the same scene, rays and cores.
 
+pub(crate) mod denoised;
 mod instant_radiosity;
 mod on_device;
 mod paper_a;
@@ -121,6 +122,7 @@ impl Bench {
         let begun = Instant::now();
         let (vsls, place_ms, light_ms) = match (point.method, prepared) {
             (Method::PathTracing, _) => return self.path_traced(point, watch),
+            (Method::PathTracingDenoised, _) => return self.path_traced_and_denoised(point, watch),
             (Method::PaperA, Some((simulation, place_ms))) => {
                 let (vsls, light_ms) = paper_a::lights(simulation)?;
                 (vsls, *place_ms, light_ms)
@@ -180,6 +182,22 @@ impl Bench {
         let traced = reference(&self.scene, &options, watch)?;
         let times = Times { picture_ms: traced.stats.render_ms, ..Times::default() };
         Ok((traced.film, times, None))
+    }
+
+    /// The guides are the picture's, too, and so is the time that they take.
+    fn path_traced_and_denoised(
+        &self,
+        point: &Point,
+        watch: Watch<'_>,
+    ) -> Result<(Film, Times, Option<usize>), EvaluateError> {
+        let begun = Instant::now();
+        let (noisy, ..) = self.path_traced(point, watch)?;
+        let mut options = self.options(point);
+        options.layers = vec![LayerKind::Albedo, LayerKind::Normal];
+        let guides = render(&self.scene, &VslSet::default(), &options, watch)?.film;
+        let film = denoised::denoise(&noisy, &guides)?;
+        let picture_ms = begun.elapsed().as_secs_f64() * 1e3;
+        Ok((film, Times { picture_ms, ..Times::default() }, None))
     }
 
     /// What is placed once for a scene, whatever is rendered of it.

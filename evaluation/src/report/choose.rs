@@ -14,13 +14,14 @@ struct Group {
     takes: fn(&str) -> bool,
 }
 
-const GROUPS: [Group; 4] = [
+const GROUPS: [Group; 5] = [
     Group { name: "Photon streaming", takes: |method| method == Method::PhotonStreaming.name() },
     Group {
         name: "Photon streaming on the GPU",
         takes: |method| method == Method::PhotonStreamingGpu.name(),
     },
     Group { name: "Path tracing", takes: |method| method == Method::PathTracing.name() },
+    Group { name: "Path tracing, denoised", takes: |method| method == Method::PathTracingDenoised.name() },
     Group { name: "Best of the others", takes: |_| true },
 ];
 

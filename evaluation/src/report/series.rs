@@ -44,6 +44,7 @@ pub(super) fn kind(row: &Row) -> String {
             format!("Photon streaming{place}, {shadows}")
         }
         _ if method == Method::PathTracing.name() => "Path tracing".into(),
+        _ if method == Method::PathTracingDenoised.name() => "Path tracing, denoised".into(),
         _ if method == Method::InstantRadiosity.name() => "Instant radiosity".into(),
         _ if method == Method::InstantRadiosityBounded.name() => "Instant radiosity, bounded".into(),
         _ if method == Method::PaperA.name() => "Paper A as written".into(),
