@@ -8,4 +8,5 @@ mod edited;
 mod extremes;
 mod only_what_changed;
 mod scenes;
+mod twin_distance_map;
 mod twins;
