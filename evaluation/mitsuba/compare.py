@@ -8,9 +8,8 @@ several times with seeds of their own, all pixels averaged over their whole area
   indirect  full less direct                              (Mitsuba: the difference, from the same seeds)
 
 A layer agrees when
-  1. the means of the picture differ by at most --tolerance (0.5 %), and those of each channel that is not dark by at most
-     that plus three standard deviations of its noise; the table tells the noise: with more than a third of the
-     tolerance, chance may decide, and more paths should;
+  1. the means of the picture, and of each channel that is not dark, differ by at most --tolerance (0.5 %); the table tells
+     the noise: with more than a third of the tolerance, chance may decide, and more paths should;
   2. no block of 8 x 8 and none of 32 x 32 pixels differs, in any channel, by more than --tolerance of its own
      brightness (and 0.01 % of the picture's) plus noise: what is beyond that tolerance must stay below z standard
      deviations, where z is exceeded by chance once in a thousand pictures (two-sided, all blocks and channels counted).
@@ -146,11 +145,9 @@ def judge(a, b, paths, tolerance):
     noise = math.sqrt(grey.sum()) / grey.size / abs(whole) if whole != 0.0 else 0.0
     lit_channels = [c for c in range(3) if mean_b[..., c].mean() > DARK_CHANNEL * whole]
     channels = [float(mean_a[..., c].mean() / mean_b[..., c].mean() - 1.0) for c in lit_channels]
-    most_of = [tolerance + 3.0 * math.sqrt(variance[..., c].sum()) / variance[..., c].size / mean_b[..., c].mean()
-               for c in lit_channels]
     figures = {"mean_ours": float(mean_a.mean()), "mean_mitsuba": float(whole), "difference": float(difference),
                "difference_sigma": noise, "difference_channels": channels, "dark": False, "blocks": {}}
-    agrees = abs(difference) <= tolerance and all(abs(d) <= most for d, most in zip(channels, most_of))
+    agrees = all(abs(d) <= tolerance for d in [difference, *channels])
     for edge in BLOCKS_PX:
         size = edge * edge
         delta = in_blocks(mean_a - mean_b, edge) / size
