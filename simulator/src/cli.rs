@@ -113,8 +113,10 @@ impl Overrides {
             Some(MapEdge::Px(px)) => streaming.distance_map_px = Some(px),
             Some(MapEdge::Auto) => {
                 let vsls = streaming.vsls.unwrap_or(StreamingSettings::default().vsls);
-                let px = StreamingSettings::default_distance_map_px(vsls);
-                streaming.distance_map_px.get_or_insert(px);
+                // A resolved text says 0 where none were needed.
+                if streaming.distance_map_px.unwrap_or(0) == 0 {
+                    streaming.distance_map_px = Some(StreamingSettings::default_distance_map_px(vsls));
+                }
             }
             None => {}
         }
@@ -215,6 +217,30 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+
+    /// `auto` gives maps where the config has none or says 0, as resolved texts do, and keeps the edge that a config says.
+    #[test]
+    fn maps_come_where_none_are_said() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/cornell-box.toml");
+        let px = |said: Option<u32>, asked: &str| {
+            let mut config = SceneConfig::from_file(&path).unwrap();
+            config.streaming.distance_map_px = said;
+            let overrides =
+                Overrides { distance_map_px: Some(asked.parse().unwrap()), ..Overrides::default() };
+            overrides.apply(config).unwrap().build().unwrap().streaming.distance_map_px
+        };
+        let cases = [
+            (None, "auto", 32),
+            (Some(0), "auto", 32),
+            (Some(8), "auto", 8),
+            (Some(8), "64", 64),
+            (Some(8), "0", 0),
+        ];
+        for (said, asked, expected) in cases {
+            assert_eq!(px(said, asked), expected, "{said:?}, {asked}");
+        }
+        assert!("12".parse::<MapEdge>().is_err());
+    }
 
     /// Told to stop before half a million lights are placed; and not told to, for one a surface.
     #[test]
