@@ -1,15 +1,11 @@
 //! Turns the protocol's figures to hold into one table, `memcpy` and frames by turns in one run: `cargo bench --bench figures`.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
-#![allow(
-    unsafe_code,
-    reason = "`memcpy` out of another map of the same file, which a reader's copy is compared with"
-)]
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use memmap2::{Mmap, MmapMut};
+use memmap2::MmapMut;
 use photonstream_protocol::{
     AccessMode, ChannelName, ChunkSet, ControlServer, FrameSource, Liveness, NOTICE_CAPACITY, Publisher,
     Reading, Runtime, SegmentSpec, StatisticsRecord, Subscriber, VslRecord,
@@ -86,17 +82,6 @@ fn summary(mut times: Vec<f64>) -> (f64, f64) {
     (times[times.len() / 2], times[times.len() / 10])
 }
 
-/// Three buffers of shared memory and another map of them, as a ring and its reader are.
-fn two_maps(bytes: usize) -> (MmapMut, Mmap) {
-    let file = tempfile::tempfile_in("/dev/shm").unwrap();
-    file.set_len(3 * bytes as u64).unwrap();
-    // SAFETY: the file has no name, so that no other process changes its length or bytes.
-    let to = unsafe { MmapMut::map_mut(&file) }.unwrap();
-    // SAFETY: as above; `memcpy` below reads these bytes only between two writes of this thread.
-    let from = unsafe { Mmap::map(&file) }.unwrap();
-    (to, from)
-}
-
 /// `memcpy` from three buffers in turn into two, and whole and partial frames, by turns of some rounds.
 fn frames(count: usize) {
     let root = tempfile::tempdir().unwrap();
@@ -106,7 +91,8 @@ fn frames(count: usize) {
     let vsls = vec![VslRecord { area: 1.0, flux: [1.0; 3], ..VslRecord::default() }; count];
     let bytes: &[u8] = bytemuck::cast_slice(&vsls);
     let all = ChunkSet::all(count);
-    let (mut shared, other) = two_maps(bytes.len());
+    // Three buffers of shared memory, as a ring has them.
+    let mut shared = MmapMut::map_anon(3 * bytes.len()).unwrap();
     let mut to = vec![bytes.to_vec(); 2];
     let mut times: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::new());
     let mut read = || while subscriber.read().unwrap() != Reading::New {};
@@ -114,7 +100,7 @@ fn frames(count: usize) {
         for round in 0..ROUNDS / TURNS {
             let buffer = round % 3 * bytes.len()..(round % 3 + 1) * bytes.len();
             shared[buffer.clone()].copy_from_slice(bytes);
-            let (from, to) = (std::hint::black_box(&other[buffer]), &mut to[round % 2]);
+            let (from, to) = (std::hint::black_box(&shared[buffer]), &mut to[round % 2]);
             times[0].push(us(|| std::hint::black_box(to).copy_from_slice(from)));
         }
         for _ in 0..ROUNDS / TURNS {

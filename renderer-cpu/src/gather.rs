@@ -147,21 +147,16 @@ fn add_block<S: Simd, const RANGED: bool, const BY_LOT: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{cull::Culling, surface::Surface, tile::TILE_SAMPLES};
+    use crate::{cull::Culling, tile::random};
     use glam::Vec3;
     use photonstream_renderer::{Vsl, VslSet};
-    use photonstream_shading::{Kernel, sampling, sobol::Sequence};
+    use photonstream_shading::Kernel;
 
     /// Random pixels and lights, some of them coincident: every instruction set gives bit for bit the f32 sum of
     /// `Kernel::transfer` in the order of the lights. N = 1000 pixels × 300 lights, seed 3.
     #[test]
     fn every_lane_is_the_plain_sum() {
-        let points: Vec<(Vec3, Vec3)> = (0..TILE_SAMPLES as u64)
-            .map(|i| {
-                let mut s = Sequence::new(3, 0).sample(i);
-                (sampling::sphere(s.next_2d()) * s.next_1d(), sampling::sphere(s.next_2d()).normalize())
-            })
-            .collect();
+        let points = random::points(3);
         let vsls = VslSet::new((0..300).map(|i| Vsl {
             position: points[i * 3].0,
             normal: points[i * 3 + 1].1,
@@ -174,21 +169,7 @@ mod tests {
             let culling =
                 Culling { kernel, epsilon: 0.0, stochastic: false, albedo_max: 1.0, magnitude: 1.0 };
             for set in [InstructionSet::Detected, InstructionSet::Avx2, InstructionSet::Portable] {
-                let mut tile = Tile::new();
-                tile.fill(1000, |i| {
-                    let (position, normal) = points[i];
-                    let zero = Vec3::ZERO;
-                    let (albedo, emitted, distance) = (Vec3::ONE, zero, 1.0);
-                    (i % 10 != 7).then_some(Surface {
-                        position,
-                        ray_origin: zero,
-                        normal,
-                        albedo,
-                        emitted,
-                        object: 0,
-                        distance,
-                    })
-                });
+                let mut tile = random::tile(&points, 1000);
                 let mut selection = Selection::default();
                 culling.select(&vsls, &tile, 0, &mut selection);
                 assert_eq!(accumulate(set, &selection, &mut tile), 0.0);
@@ -198,7 +179,7 @@ mod tests {
                         let d = vsls.position()[k] - x;
                         expected += vsls.flux()[k] * kernel.transfer(d, n, vsls.normal()[k], vsls.area()[k]);
                     }
-                    let expected = if i % 10 == 7 { Vec3::ZERO } else { expected };
+                    let expected = if random::is_there(i) { expected } else { Vec3::ZERO };
                     assert_eq!(tile.irradiance.get(i), expected, "{kernel}, {set:?}, pixel {i}");
                 }
             }

@@ -229,22 +229,17 @@ fn look_up<S: Simd>(texels: &[u16], index: Lanes<S>) -> Lanes<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{cull::Culling, surface::Surface, tile::TILE_SAMPLES};
+    use crate::{cull::Culling, tile::random};
     use glam::Vec3;
     use photonstream_protocol::{DISTANCE_TEXELS, DistanceRecord};
     use photonstream_renderer::Vsl;
-    use photonstream_shading::{Kernel, distance_map, sampling, sobol::Sequence};
+    use photonstream_shading::{Kernel, distance_map, sobol::Sequence};
 
     /// Random pixels, lights and maps, some coincident: every instruction set gives bit for bit the f32 sum of
     /// `Kernel::transfer` times `distance_map::visibility` in the order of the lights. N = 1 000 pixels × 100 lights, seed 5.
     #[test]
     fn every_lane_is_the_plain_sum() {
-        let points: Vec<(Vec3, Vec3)> = (0..TILE_SAMPLES as u64)
-            .map(|i| {
-                let mut s = Sequence::new(5, 0).sample(i);
-                (sampling::sphere(s.next_2d()) * s.next_1d(), sampling::sphere(s.next_2d()).normalize())
-            })
-            .collect();
+        let points = random::points(5);
         let (edge, count) = (16, 100);
         let records: Vec<DistanceRecord> = (0..count * (edge * edge) as usize / DISTANCE_TEXELS)
             .map(|i| DistanceRecord {
@@ -268,21 +263,7 @@ mod tests {
             let culling =
                 Culling { kernel, epsilon: 0.0, stochastic: false, albedo_max: 1.0, magnitude: 1.0 };
             for set in [InstructionSet::Detected, InstructionSet::Avx2, InstructionSet::Portable] {
-                let mut tile = Tile::new();
-                tile.fill(1000, |i| {
-                    let (position, normal) = points[i];
-                    let (albedo, emitted, distance) = (Vec3::ONE, Vec3::ZERO, 1.0);
-                    let ray_origin = position;
-                    (i % 10 != 7).then_some(Surface {
-                        position,
-                        ray_origin,
-                        normal,
-                        albedo,
-                        emitted,
-                        object: 0,
-                        distance,
-                    })
-                });
+                let mut tile = random::tile(&points, 1000);
                 let mut selection = Selection::default();
                 culling.select(&vsls, &tile, 0, &mut selection);
                 assert_eq!(accumulate(set, &vsls, &selection, &mut tile), 0.0);
@@ -297,7 +278,7 @@ mod tests {
                         expected += vsls.flux()[k] * (transfer * seen);
                         shadowed += usize::from(transfer > 0.0 && seen < 1.0);
                     }
-                    let expected = if i % 10 == 7 { Vec3::ZERO } else { expected };
+                    let expected = if random::is_there(i) { expected } else { Vec3::ZERO };
                     assert_eq!(tile.irradiance.get(i), expected, "{kernel}, {set:?}, pixel {i}");
                 }
                 assert!(shadowed > 10_000, "{shadowed}");

@@ -103,3 +103,36 @@ impl Tile {
 
 /// Lanes of the widest instruction set.
 pub(crate) const MAX_LANES: usize = 16;
+
+#[cfg(test)]
+pub(crate) mod random {
+    use super::*;
+    use photonstream_shading::{sampling, sobol::Sequence};
+
+    /// As many places in the unit ball with unit normals as a tile has samples.
+    pub(crate) fn points(seed: u64) -> Vec<(Vec3, Vec3)> {
+        let point = |i: u64| {
+            let mut s = Sequence::new(seed, 0).sample(i);
+            (sampling::sphere(s.next_2d()) * s.next_1d(), sampling::sphere(s.next_2d()).normalize())
+        };
+        (0..TILE_SAMPLES as u64).map(point).collect()
+    }
+
+    /// A tile whose first `count` samples see white surfaces at the points, but for every tenth from the seventh on, which see nothing.
+    pub(crate) fn tile(points: &[(Vec3, Vec3)], count: usize) -> Tile {
+        let mut tile = Tile::new();
+        tile.fill(count, |i| {
+            let (position, normal) = points[i];
+            let (albedo, emitted) = (Vec3::ONE, Vec3::ZERO);
+            let surface =
+                Surface { position, ray_origin: position, normal, albedo, emitted, object: 0, distance: 1.0 };
+            is_there(i).then_some(surface)
+        });
+        tile
+    }
+
+    /// Whether sample `i` of such a tile sees anything.
+    pub(crate) fn is_there(i: usize) -> bool {
+        i % 10 != 7
+    }
+}

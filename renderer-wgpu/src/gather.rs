@@ -1,11 +1,13 @@
 //! Turns virtual surface lights into irradiance: forward, splatted or tiled, all to the same picture.
 
+mod variant;
+
+use self::variant::{Variant, pipeline};
 use crate::{
     Accumulation, Gpu, GpuError,
-    deferred::depth_test,
     geometry::{self, Geometry},
-    layout::{BATCH_WORDS, Corner, TILE_EDGE, TileBounds},
-    pipelines::{self, Drawing, groups_of_64, part, texture, whole},
+    layout::{BATCH_WORDS, TILE_EDGE, TileBounds},
+    pipelines::{self, groups_of_64, part, texture, whole},
     readback,
     scope::{Edge, Scope},
     shader,
@@ -15,17 +17,6 @@ use crate::{
 use glam::Vec3;
 use std::collections::HashMap;
 use wgpu::{BufferUsages, LoadOp, TextureUsages};
-
-/// A variant of a gathering pipeline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct Variant {
-    accumulation: Accumulation,
-    ranged: bool,
-    continues: bool,
-    interleaved: bool,
-    patches: bool,
-    mapped: bool,
-}
 
 /// How the lights of a picture are gathered.
 #[derive(Clone, Copy, Debug)]
@@ -360,49 +351,4 @@ fn turn(targets: &Targets, more: u32) -> (&wgpu::TextureView, &wgpu::TextureView
     let indirect = &targets.indirect.view;
     let spare = targets.spare.as_ref().map_or(indirect, |s| &s.view);
     if more.is_multiple_of(2) { (indirect, spare) } else { (spare, indirect) }
-}
-
-fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
-    let ranged = ("RANGED", f64::from(variant.ranged));
-    let patches = ("PATCHES", f64::from(variant.patches));
-    let mapped = ("MAPPED", f64::from(variant.mapped));
-    let additive = Drawing { fragment: Some("add"), format: Some(HDR), additive: true, ..Drawing::default() };
-    match variant.accumulation {
-        Accumulation::Tiled => {
-            let constants = [ranged, patches, mapped, ("CONTINUES", f64::from(variant.continues))];
-            let entry = if variant.interleaved { "gather_interleaved" } else { "gather" };
-            let set = Drawing {
-                vertex: "cover",
-                fragment: Some(entry),
-                constants: &constants,
-                second: variant.interleaved,
-                additive: false,
-                ..additive
-            };
-            pipelines::drawing(gpu, &shader::TILED, &set)
-        }
-        Accumulation::Splat => {
-            let constants = [ranged, patches, mapped];
-            // The far sides, once each, wherever the eye is.
-            let set = Drawing {
-                vertex: "sphere",
-                constants: &constants,
-                cull: Some(wgpu::Face::Front),
-                ..additive
-            };
-            pipelines::drawing(gpu, &shader::SPLAT, &set)
-        }
-        Accumulation::Forward => {
-            let constants = [ranged, patches, mapped];
-            let set = Drawing {
-                vertex: "corner",
-                constants: &constants,
-                corners: Some(Corner::layout()),
-                // The same triangles in the same place as in the G-buffer have the same depth.
-                depth: Some(depth_test(false, wgpu::CompareFunction::Equal)),
-                ..additive
-            };
-            pipelines::drawing(gpu, &shader::FORWARD, &set)
-        }
-    }
 }
