@@ -139,15 +139,13 @@ impl<'a> Frame<'a> {
         options: &'a RenderOptions,
         instructions: InstructionSet,
     ) -> Self {
-        let albedo_max =
-            scene.objects.iter().map(|o| scene.materials[o.material.0 as usize].albedo.max_element());
         let (lo, hi) = scene.bvh.bounds();
         let magnitude = lo.abs().max(hi.abs()).max_element();
         let culling = Culling {
             kernel: options.kernel,
             epsilon: options.epsilon,
             stochastic: options.culling == RangeCulling::Stochastic,
-            albedo_max: albedo_max.fold(0.0, f32::max),
+            albedo_max: scene.albedo_max(),
             magnitude: if magnitude.is_finite() { magnitude } else { 0.0 },
         };
         let owners = options.needs(LayerKind::needs_owner).then(|| Owners::new(vsls, scene.objects.len()));
@@ -215,7 +213,8 @@ impl<'a> Frame<'a> {
         };
         let camera = &self.scene.camera;
         let direction = camera.direction(px as f32 + u, py as f32 + v, options.width, options.height);
-        surface::first(self.scene, camera.position, direction)
+        let pixel = camera.pixel_width(options.height);
+        surface::first(self.scene, camera.position, direction, pixel)
     }
 
     fn gather(&self, tile: &mut Tile, first_lot: u32, selection: &mut Selection, result: &mut TileResult) {

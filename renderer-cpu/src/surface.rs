@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 use photonstream_scene::{
-    Scene, Side,
+    Detail, Scene, Side,
     bvh::{Hit, Ray},
 };
-use photonstream_shading::surface;
+use photonstream_shading::{surface, texture};
 
 /// What a ray has met, seen from where the ray came.
 #[derive(Clone, Copy, Debug)]
@@ -26,15 +26,16 @@ pub(crate) struct Surface {
     pub(crate) distance: f32,
 }
 
-/// The first surface along a ray of unlimited length.
+/// The first surface along a ray of unlimited length, whose direction is a unit vector; `pixel` is the width of what its
+/// textures are averaged over at distance 1, or 0 to look at them as finely as they are.
 #[inline]
-pub(crate) fn first(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<Surface> {
+pub(crate) fn first(scene: &Scene, origin: Vec3, direction: Vec3, pixel: f32) -> Option<Surface> {
     let ray = Ray { origin, direction, t_max: f32::INFINITY };
-    scene.bvh.closest(&ray).map(|hit| describe(scene, &hit, direction))
+    scene.bvh.closest(&ray).map(|hit| describe(scene, &hit, direction, pixel))
 }
 
 #[inline]
-fn describe(scene: &Scene, hit: &Hit, direction: Vec3) -> Surface {
+fn describe(scene: &Scene, hit: &Hit, direction: Vec3, pixel: f32) -> Surface {
     let vertices = scene.geometry.triangle(hit.triangle);
     let front = scene.geometry.normals[hit.triangle as usize];
     let side = if front.dot(direction) < 0.0 { Side::Front } else { Side::Back };
@@ -42,7 +43,15 @@ fn describe(scene: &Scene, hit: &Hit, direction: Vec3) -> Surface {
     let position = surface::point(vertices, hit.u, hit.v);
     let id = scene.geometry.object_of[hit.triangle as usize];
     let object = &scene.objects[id.0 as usize];
-    let albedo = if object.sides.contains(side) { scene.albedo(id) } else { Vec3::ZERO };
+    let albedo = if object.sides.contains(side) {
+        let detail = match pixel > 0.0 {
+            true => Detail::Width(texture::footprint(pixel, hit.t, normal.dot(direction).abs())),
+            false => Detail::Finest,
+        };
+        scene.albedo_at(hit.triangle, [hit.u, hit.v], detail)
+    } else {
+        Vec3::ZERO
+    };
     Surface {
         position,
         ray_origin: surface::offset(vertices, position, normal),

@@ -3,12 +3,13 @@
 use crate::{
     Gpu,
     geometry::Geometry,
-    layout::Corner,
+    layout::{Corner, TextureCorner},
     pipelines::{self, Drawing, texture, whole},
     scope::Scope,
     shader,
     shadow_maps::ShadowMaps,
     targets::{DEPTH, GBUFFER, HDR, Target, Targets},
+    textures::Textures,
 };
 use glam::Vec3;
 use photonstream_scene::Features;
@@ -35,6 +36,8 @@ impl DirectKind {
 #[derive(Debug)]
 pub(crate) struct Deferred {
     gbuffer: wgpu::RenderPipeline,
+    /// The same for a scene with textures, and the composite.
+    textured: Option<[wgpu::RenderPipeline; 2]>,
     direct: Option<(DirectKind, wgpu::RenderPipeline)>,
     composite: wgpu::RenderPipeline,
     /// Stands in for what a picture does not need.
@@ -50,25 +53,40 @@ pub(crate) struct Shown<'a> {
     pub(crate) owners: Option<&'a wgpu::TextureView>,
     pub(crate) colours: &'a wgpu::Buffer,
     pub(crate) tallies: &'a wgpu::Buffer,
+    /// Whether the scene has textures.
+    pub(crate) textured: bool,
+}
+
+fn gbuffer_drawing() -> Drawing<'static> {
+    Drawing {
+        vertex: "corner",
+        fragment: Some("surface"),
+        format: Some(GBUFFER),
+        corners: Some(Corner::layout()),
+        depth: Some(depth_test(true, wgpu::CompareFunction::Greater)),
+        ..Drawing::default()
+    }
+}
+
+fn textured(gpu: &Gpu) -> [wgpu::RenderPipeline; 2] {
+    let corners = Some(TextureCorner::layout());
+    let set = Drawing { second: true, texture_corners: corners, ..gbuffer_drawing() };
+    [
+        pipelines::drawing(gpu, &shader::GBUFFER_TEXTURED, &set),
+        pipelines::covering(gpu, &shader::COMPOSITE, "layer_textured", HDR, &[]),
+    ]
 }
 
 impl Deferred {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let set = Drawing {
-            vertex: "corner",
-            fragment: Some("surface"),
-            format: Some(GBUFFER),
-            corners: Some(Corner::layout()),
-            depth: Some(depth_test(true, wgpu::CompareFunction::Greater)),
-            ..Drawing::default()
-        };
         let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
         let open = Target::new(gpu, "open", [1, 1], crate::targets::OPENNESS, usage);
         let size = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
         let row = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4), rows_per_image: None };
         gpu.queue.write_texture(open.texture.as_image_copy(), bytemuck::bytes_of(&1f32), row, size);
         Self {
-            gbuffer: pipelines::drawing(gpu, &shader::GBUFFER, &set),
+            gbuffer: pipelines::drawing(gpu, &shader::GBUFFER, &gbuffer_drawing()),
+            textured: None,
             direct: None,
             composite: pipelines::covering(gpu, &shader::COMPOSITE, "layer", HDR, &[]),
             open,
@@ -78,12 +96,15 @@ impl Deferred {
 
     /// Draws what the camera sees into the G-buffer; the number of objects that it may see.
     pub(crate) fn encode_gbuffer(
-        &self,
+        &mut self,
         scope: &mut Scope<'_>,
-        targets: &Targets,
-        geometry: &Geometry,
+        targets: &mut Targets,
+        (geometry, textures): (&Geometry, Option<&Textures>),
         sees: impl Fn(Vec3, f32) -> bool,
     ) -> u32 {
+        if let Some(textures) = textures {
+            return self.encode_textured(scope, targets, (geometry, textures), sees);
+        }
         let group = pipelines::bind(scope.gpu, &self.gbuffer.get_bind_group_layout(0), &[whole(scope.frame)]);
         let edge = scope.alone("G-buffer");
         let nothing = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -92,6 +113,32 @@ impl Deferred {
             scope.render_pass(edge, Some((&targets.gbuffer.view, nothing)), Some((&targets.depth.view, far)));
         pass.set_pipeline(&self.gbuffer);
         pass.set_bind_group(0, &group, &[]);
+        geometry.draw(&mut pass, 0..1, sees)
+    }
+
+    fn encode_textured(
+        &mut self,
+        scope: &mut Scope<'_>,
+        targets: &mut Targets,
+        (geometry, textures): (&Geometry, &Textures),
+        sees: impl Fn(Vec3, f32) -> bool,
+    ) -> u32 {
+        targets.prepare_texel(scope.gpu);
+        let [pipeline, _] = self.textured.get_or_insert_with(|| textured(scope.gpu));
+        let resources = [whole(scope.frame), whole(&textures.texels), whole(&textures.layouts)];
+        let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
+        let edge = scope.alone("G-buffer");
+        let nothing = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let views: Vec<_> = [Some(&targets.gbuffer), targets.texel.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(|t| (&t.view, nothing))
+            .collect();
+        let far = wgpu::LoadOp::Clear(0.0);
+        let mut pass = scope.render_pass_to(edge, &views, Some((&targets.depth.view, far)));
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_vertex_buffer(1, textures.corners.slice(..));
         geometry.draw(&mut pass, 0..1, sees)
     }
 
@@ -144,9 +191,14 @@ impl Deferred {
             whole(shown.colours),
             whole(shown.tallies),
         ];
-        let group = pipelines::bind(scope.gpu, &self.composite.get_bind_group_layout(0), &resources);
+        let (mut resources, mut pipeline) = (resources.to_vec(), &self.composite);
+        if let (true, Some([_, textured]), Some(texel)) = (shown.textured, &self.textured, &targets.texel) {
+            resources.push(texture(&texel.view));
+            pipeline = textured;
+        }
+        let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
         let edge = scope.alone("composite");
-        scope.cover(edge, &self.composite, &group, &targets.output.view);
+        scope.cover(edge, pipeline, &group, &targets.output.view);
     }
 }
 

@@ -94,6 +94,17 @@ impl Renderer {
             self.gpu.queue.write_buffer(&self.frame_buffer, 0, bytemuck::bytes_of(&frame));
             self.frame = frame;
         }
+        let has_holes = scene.textures.as_ref().is_some_and(|textures| textures.has_holes);
+        let (light_rays, vsl_rays) =
+            (view.needs_direct() && view.shadows == Shadows::Rays, view.needs_indirect() && view.by_rays());
+        if has_holes && (light_rays || vsl_rays) {
+            return Err(GpuError::Unsupported {
+                option: if vsl_rays { "visibility rays".into() } else { "shadows rays".into() },
+                adapter: self.gpu.name(),
+                lacks: "rays that pass through the holes of this scene's textures".into(),
+                remedy: "choose --shadows maps and --visibility octahedral, or --renderer cpu",
+            });
+        }
         self.timer.restart();
         let mut scope = Scope {
             gpu: &self.gpu,
@@ -101,12 +112,18 @@ impl Renderer {
             timer: &mut self.timer,
             frame: &self.frame_buffer,
         };
+        let holes = scene.textures.as_ref().filter(|textures| textures.has_holes);
         let (done, versions) = (&mut self.done, self.versions);
         let mut drawn = Drawn { redrawn: true, ..Drawn::default() };
         let aspect = view.width as f32 / view.height as f32;
         let sees = |centre: Vec3, radius: f32| can_see(&view.camera, aspect, centre, radius);
         if done.is_stale(Stage::GBuffer, view, versions) {
-            drawn.objects_drawn = self.deferred.encode_gbuffer(&mut scope, targets, &scene.geometry, sees);
+            drawn.objects_drawn = self.deferred.encode_gbuffer(
+                &mut scope,
+                targets,
+                (&scene.geometry, scene.textures.as_ref()),
+                sees,
+            );
         }
         if view.needs_direct() && done.is_stale(Stage::Direct, view, versions) {
             let with_maps = view.shadows == Shadows::Maps;
@@ -115,11 +132,12 @@ impl Renderer {
                 scene.bounds,
                 view.light_samples,
                 with_maps,
-                scene.geometry.is_readable(&self.gpu),
+                // Triangles with holes are not told by their names alone.
+                scene.geometry.is_readable(&self.gpu) && holes.is_none(),
             );
             let (new_views, _) = self.maps.update(&self.gpu, table);
             if with_maps && (new_views || done.is_stale(Stage::Maps, view, versions)) {
-                self.maps.encode(scope.gpu, &mut scope.encoder, &scene.geometry, scope.timer);
+                self.maps.encode(scope.gpu, &mut scope.encoder, (&scene.geometry, holes), scope.timer);
                 done.set(Stage::Maps, view, versions);
             }
             if view.shadows == Shadows::Rays {
@@ -209,6 +227,7 @@ impl Renderer {
             owners: targets.owners.as_ref().map(|t| &t[0].view),
             colours: &self.owners.colours,
             tallies: &self.gather.tallies,
+            textured: scene.textures.is_some(),
         };
         self.deferred.encode_composite(&mut scope, targets, &shown);
         if view.show == Show::Discs {

@@ -158,6 +158,18 @@ shared! {
         pad_0: u32,
     }
 
+    /// Twin of `TextureLayout` in texture.wgsl.
+    TextureLayoutUniform as "TextureLayout" {
+        first: u32,
+        width: u32,
+        height: u32,
+        levels: u32,
+        wrap_u: u32,
+        wrap_v: u32,
+        cutoff: f32,
+        pad_0: u32,
+    }
+
     /// Twin of `Light` in light.wgsl.
     LightUniform as "Light" {
         position: [f32; 3],
@@ -255,6 +267,27 @@ pub(crate) struct Corner {
 impl Corner {
     pub(crate) const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
         wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32];
+
+    pub(crate) fn layout() -> wgpu::VertexBufferLayout<'static> {
+        wgpu::VertexBufferLayout {
+            array_stride: size_of::<Self>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &Self::ATTRIBUTES,
+        }
+    }
+}
+
+/// A corner's part of the vertices of a scene with textures.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub(crate) struct TextureCorner {
+    pub(crate) uv: [f32; 2],
+    /// Texels of the finest level in a metre.
+    pub(crate) density: f32,
+}
+
+impl TextureCorner {
+    const ATTRIBUTES: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![3 => Float32x2, 4 => Float32];
 
     pub(crate) fn layout() -> wgpu::VertexBufferLayout<'static> {
         wgpu::VertexBufferLayout {

@@ -28,6 +28,7 @@ mod shadow_views;
 mod stages;
 mod targets;
 pub mod test_gpu;
+mod textures;
 mod timer;
 mod view;
 mod vsl_buffer;

@@ -15,6 +15,8 @@ pub(crate) struct Drawing<'a> {
     pub(crate) additive: bool,
     pub(crate) depth: Option<wgpu::DepthStencilState>,
     pub(crate) corners: Option<wgpu::VertexBufferLayout<'a>>,
+    /// Texture coordinates of the corners.
+    pub(crate) texture_corners: Option<wgpu::VertexBufferLayout<'a>>,
     pub(crate) cull: Option<wgpu::Face>,
     pub(crate) strip: bool,
 }
@@ -33,8 +35,11 @@ pub(crate) fn drawing(gpu: &Gpu, source: &Source, drawing: &Drawing<'_>) -> wgpu
         blend: drawing.additive.then_some(wgpu::BlendState { color: add, alpha: add }),
         write_mask: wgpu::ColorWrites::ALL,
     });
-    let targets = vec![target; if drawing.second { 2 } else { 1 }];
-    let corners: Vec<_> = drawing.corners.iter().cloned().map(Some).collect();
+    let targets = match (drawing.format, drawing.second) {
+        (None, _) => Vec::new(),
+        (_, second) => vec![target; if second { 2 } else { 1 }],
+    };
+    let corners: Vec<_> = drawing.corners.iter().chain(&drawing.texture_corners).cloned().map(Some).collect();
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(source.name),
         layout: None,

@@ -13,6 +13,7 @@ use crate::{
     shadow_maps::ShadowMaps,
     stages::{Done, Versions},
     targets::Targets,
+    textures::Textures,
     timer::Timer,
     vsl_buffer::{Upload, VslBuffer},
 };
@@ -48,6 +49,7 @@ pub struct Renderer {
 #[derive(Debug)]
 pub(crate) struct OnDevice {
     pub(crate) geometry: Geometry,
+    pub(crate) textures: Option<Textures>,
     pub(crate) lights: Vec<SceneLight>,
     pub(crate) bounds: Bounds,
     pub(crate) features: Features,
@@ -112,30 +114,32 @@ impl Renderer {
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn set_scene(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        let albedo =
-            |o: &photonstream_scene::Object| scene.materials[o.material.0 as usize].albedo.max_element();
         let (lo, hi) = scene.bvh.bounds();
         let magnitude = lo.abs().max(hi.abs()).max_element();
-        let albedo_max = scene.objects.iter().map(albedo).fold(0.0, f32::max);
         let magnitude = if magnitude.is_finite() { magnitude } else { 0.0 };
-        let (geometry, changed) = match self.scene.take() {
-            None => (Geometry::new(&self.gpu, scene)?, geometry::Changed { shape: true, materials: true }),
+        let (geometry, last_textures, changed) = match self.scene.take() {
+            None => {
+                (Geometry::new(&self.gpu, scene)?, None, geometry::Changed { shape: true, materials: true })
+            }
             Some(mut last) => {
                 let changed = last.geometry.update(&self.gpu, scene)?;
                 if last.lights != scene.lights {
                     self.versions.lights += 1;
                 }
-                (last.geometry, changed)
+                (last.geometry, last.textures, changed)
             }
         };
+        let (textures, are_new) = Textures::update(&self.gpu, scene, last_textures);
+        let changed = geometry::Changed { shape: changed.shape || are_new, ..changed };
         self.versions.shape += u64::from(changed.shape);
         self.versions.materials += u64::from(changed.materials);
         self.scene = Some(OnDevice {
             geometry,
+            textures,
             lights: scene.lights.clone(),
             bounds: scene.bounds,
             features: scene.features.clone(),
-            albedo_max,
+            albedo_max: scene.albedo_max(),
             magnitude,
         });
         Ok(())

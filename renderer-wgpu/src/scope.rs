@@ -80,16 +80,26 @@ impl Scope<'_> {
         target: Option<(&wgpu::TextureView, wgpu::LoadOp<wgpu::Color>)>,
         depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
     ) -> wgpu::RenderPass<'_> {
-        let colour = target.map(|(view, load)| wgpu::RenderPassColorAttachment {
+        self.render_pass_to(edge, target.as_slice(), depth)
+    }
+
+    /// The same with any number of targets.
+    pub(crate) fn render_pass_to(
+        &mut self,
+        edge: Edge,
+        targets: &[(&wgpu::TextureView, wgpu::LoadOp<wgpu::Color>)],
+        depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
+    ) -> wgpu::RenderPass<'_> {
+        let colour = |&(view, load): &(_, _)| wgpu::RenderPassColorAttachment {
             view,
             depth_slice: None,
             resolve_target: None,
             ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-        });
-        let colours = [colour];
+        };
+        let colours: Vec<_> = targets.iter().map(|target| Some(colour(target))).collect();
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: None,
-            color_attachments: if target.is_some() { &colours } else { &[] },
+            color_attachments: &colours,
             depth_stencil_attachment: depth.map(|(view, load)| wgpu::RenderPassDepthStencilAttachment {
                 view,
                 depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),

@@ -38,7 +38,9 @@ macro_rules! sources {
 
 sources! {
     GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION];
+    GBUFFER_TEXTURED = "gbuffer_textured" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION, wgsl::TEXTURE];
     SHADOW_MAP = "shadow_map" [];
+    SHADOW_MAP_HOLES = "shadow_map_holes" [wgsl::TEXTURE];
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];

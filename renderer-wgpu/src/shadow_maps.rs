@@ -4,11 +4,12 @@ use crate::{
     Gpu,
     deferred::depth_test,
     geometry::{self, Geometry},
-    layout::{Corner, NO_LAYER, ShadowView},
+    layout::{Corner, NO_LAYER, ShadowView, TextureCorner},
     pipelines::{self, Drawing},
     shader,
     shadow_views::LightTable,
     targets::DEPTH,
+    textures::Textures,
     timer::Timer,
 };
 use wgpu::{BufferUsages, TextureUsages};
@@ -21,6 +22,8 @@ const VIEW_STRIDE: u64 = 256;
 pub(crate) struct ShadowMaps {
     /// Draws depths alone, biased: they are compared with receivers.
     depths: wgpu::RenderPipeline,
+    /// The same where textures have holes.
+    holes: Option<wgpu::RenderPipeline>,
     /// Draws which triangles are nearest.
     naming: wgpu::RenderPipeline,
     pub(crate) sampler: wgpu::Sampler,
@@ -47,23 +50,14 @@ impl ShadowMaps {
             fragment: Some("name"),
             format: Some(NAMES),
             corners: Some(Corner::layout()),
-            depth: Some(depth.clone()),
-            ..Drawing::default()
-        };
-        let depths = Drawing {
-            vertex: "corner",
-            corners: Some(Corner::layout()),
-            // Away from the light, which in reversed depth is down; more for slopes.
-            depth: Some(wgpu::DepthStencilState {
-                bias: wgpu::DepthBiasState { constant: -2, slope_scale: -1.5, clamp: 0.0 },
-                ..depth
-            }),
+            depth: Some(depth),
             ..Drawing::default()
         };
         let texture = maps_texture(gpu, DEPTH, 1, 1);
         let names_texture = maps_texture(gpu, NAMES, 1, 1);
         Self {
-            depths: pipelines::drawing(gpu, &shader::SHADOW_MAP, &depths),
+            depths: pipelines::drawing(gpu, &shader::SHADOW_MAP, &depths_drawing()),
+            holes: None,
             naming: pipelines::drawing(gpu, &shader::SHADOW_MAP, &naming),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("shadow comparison"),
@@ -136,20 +130,33 @@ impl ShadowMaps {
         self.table.unshadowed
     }
 
+    /// Draws all maps, with the holes of textures if there are any: then no map names triangles.
     pub(crate) fn encode(
-        &self,
+        &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
-        geometry: &Geometry,
+        (geometry, holes): (&Geometry, Option<&Textures>),
         timer: &mut Timer,
     ) {
+        if holes.is_some() && self.holes.is_none() {
+            let set = Drawing {
+                fragment: Some("holes"),
+                texture_corners: Some(TextureCorner::layout()),
+                ..depths_drawing()
+            };
+            self.holes = Some(pipelines::drawing(gpu, &shader::SHADOW_MAP_HOLES, &set));
+        }
         let span = timer.span("shadow maps");
         let count = self.table.views.len();
         for (layer, shadow_view) in self.table.views.iter().enumerate() {
             let view = one_layer(&self.texture, layer as u32);
             let names =
                 (shadow_view.layer != NO_LAYER).then(|| one_layer(&self.names_texture, shadow_view.layer));
-            let pipeline = if names.is_some() { &self.naming } else { &self.depths };
+            let pipeline = match (&names, holes, &self.holes) {
+                (Some(_), ..) => &self.naming,
+                (None, Some(_), Some(pipeline)) => pipeline,
+                _ => &self.depths,
+            };
             let layout = pipeline.get_bind_group_layout(0);
             let colours = [names.as_ref().map(|view| wgpu::RenderPassColorAttachment {
                 view,
@@ -164,7 +171,11 @@ impl ShadowMaps {
             let group = pipelines::bind(
                 gpu,
                 &layout,
-                &[pipelines::part(&self.drawn_views, offset, size_of::<ShadowView>() as u64)],
+                &[
+                    pipelines::part(&self.drawn_views, offset, size_of::<ShadowView>() as u64),
+                    holes.and_then(|textures| pipelines::whole(&textures.texels)),
+                    holes.and_then(|textures| pipelines::whole(&textures.layouts)),
+                ],
             );
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("shadow map"),
@@ -182,8 +193,25 @@ impl ShadowMaps {
             });
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
+            if let Some(textures) = holes {
+                pass.set_vertex_buffer(1, textures.corners.slice(..));
+            }
             geometry.draw(&mut pass, 0..1, |_, _| true);
         }
+    }
+}
+
+/// How depths alone are drawn.
+fn depths_drawing() -> Drawing<'static> {
+    Drawing {
+        vertex: "corner",
+        corners: Some(Corner::layout()),
+        // Away from the light, which in reversed depth is down; more for slopes.
+        depth: Some(wgpu::DepthStencilState {
+            bias: wgpu::DepthBiasState { constant: -2, slope_scale: -1.5, clamp: 0.0 },
+            ..depth_test(true, wgpu::CompareFunction::Greater)
+        }),
+        ..Drawing::default()
     }
 }
 

@@ -47,6 +47,8 @@ impl Target {
 pub(crate) struct Targets {
     pub(crate) size: [u32; 2],
     pub(crate) gbuffer: Target,
+    /// Colours of textures, in a scene with.
+    pub(crate) texel: Option<Target>,
     pub(crate) depth: Target,
     pub(crate) direct: Target,
     pub(crate) indirect: Target,
@@ -69,6 +71,7 @@ impl Targets {
         let targets = Self {
             size,
             gbuffer: Target::new(gpu, "G-buffer", size, GBUFFER, DRAWN | TextureUsages::COPY_SRC),
+            texel: None,
             depth: Target::new(gpu, "depth", size, DEPTH, TextureUsages::RENDER_ATTACHMENT),
             direct: Target::new(gpu, "direct irradiance", size, HDR, traced),
             indirect: Target::new(gpu, "indirect irradiance", size, HDR, traced),
@@ -85,6 +88,12 @@ impl Targets {
                 reason: error.to_string(),
             }),
         }
+    }
+
+    /// Makes what a scene with textures needs.
+    pub(crate) fn prepare_texel(&mut self, gpu: &Gpu) {
+        let size = self.size;
+        self.texel.get_or_insert_with(|| Target::new(gpu, "colours of textures", size, GBUFFER, DRAWN));
     }
 
     pub(crate) fn spare(&mut self, gpu: &Gpu) -> &Target {

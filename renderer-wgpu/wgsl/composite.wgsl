@@ -10,6 +10,9 @@
 @group(0) @binding(7) var<storage, read> colours: array<vec4f>;
 @group(0) @binding(8) var<storage, read> tallies: array<vec2f>;
 
+// Colours of textures, as bits.
+@group(0) @binding(9) var texel: texture_2d<u32>;
+
 @vertex
 fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
     return covering_triangle(vertex);
@@ -17,14 +20,24 @@ fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn layer(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return layer_of(vec2u(at.xy), vec3f(1.0));
+}
+
+@fragment
+fn layer_textured(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2u(at.xy);
+    return layer_of(pixel, bitcast<vec3f>(textureLoad(texel, pixel, 0).rgb));
+}
+
+// The layer at a pixel whose texture has the given colour.
+fn layer_of(pixel: vec2u, texture_colour: vec3f) -> vec4f {
     let word = textureLoad(gbuffer, pixel, 0);
     if !surface_is_there(word) {
         return vec4f(0.0, 0.0, 0.0, 1.0);
     }
     let surface = surface_unpack(word, pixel);
     let object = objects[surface.object];
-    let albedo = select(vec3f(0.0), object.albedo, object_reflects(object, surface.front));
+    let albedo = select(vec3f(0.0), object.albedo * texture_colour, object_reflects(object, surface.front));
     let emitted = select(vec3f(0.0), object.emitted, surface.front);
     let brdf = albedo * FRAC_1_PI;
     var colour = vec3f(0.0);

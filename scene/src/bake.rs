@@ -8,7 +8,7 @@ use crate::{
     primitives::Mesh,
     scene::{Geometry, Material, MaterialId, Object, ObjectId, Sides},
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use photonstream_shading::{LightShape, light::Bounds, surface};
 
 /// Most vertices and most triangles of a scene: their indices are u32.
@@ -131,6 +131,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             if part.is_imported && !is_all {
                 soup.vertices.truncate(first_vertex);
                 soup.rest_vertices.truncate(first_vertex);
+                soup.uvs.truncate(first_vertex);
                 notices.push(format!("object \"{}\": no triangle has an area; it was left out", part.name));
                 continue;
             }
@@ -159,6 +160,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             sides: part.sides,
             triangles: first_triangle..last_triangle,
             world_from_rest: pose.world_from_rest(rest.centre(pose.scale)),
+            transport_level: 0,
             emitter: None,
         });
         rest_meshes.push(rest);
@@ -179,6 +181,7 @@ fn material_id(materials: &[Material], name: &str) -> MaterialId {
 struct Soup {
     vertices: Vec<Vec3>,
     rest_vertices: Vec<Vec3>,
+    uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     normals: Vec<Vec3>,
     object_of: Vec<ObjectId>,
@@ -205,6 +208,11 @@ impl Soup {
             self.vertices.push(pose::round(world));
             self.rest_vertices.push(RestMesh::rest_vertex(point, pose.scale, centre));
         }
+        if !part.mesh.uvs.is_empty() {
+            self.uvs.resize(first as usize, Vec2::ZERO);
+            self.uvs.extend_from_slice(&part.mesh.uvs);
+            self.uvs.resize(self.vertices.len(), Vec2::ZERO);
+        }
         Ok(mesh)
     }
 
@@ -226,10 +234,14 @@ impl Soup {
         dropped
     }
 
-    fn into_geometry(self) -> Geometry {
+    fn into_geometry(mut self) -> Geometry {
+        if !self.uvs.is_empty() {
+            self.uvs.resize(self.vertices.len(), Vec2::ZERO);
+        }
         Geometry {
             vertices: self.vertices,
             rest_vertices: self.rest_vertices.into(),
+            uvs: self.uvs.into(),
             triangles: self.triangles.into(),
             normals: self.normals,
             object_of: self.object_of.into(),

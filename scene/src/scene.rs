@@ -6,10 +6,11 @@ use crate::{
     bvh::SceneBvh,
     config::LightConfig,
     features::Features,
+    picture::Texture,
     pose::{Pose, RestMesh},
     settings::{RenderSettings, StreamingSettings},
 };
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec2, Vec3};
 use photonstream_shading::{Camera, Light, light::Bounds};
 use std::{ops::Range, sync::Arc};
 
@@ -77,8 +78,10 @@ pub struct Scene {
 pub struct Material {
     /// Name in the config.
     pub name: String,
-    /// Share of the arriving light that leaves again, linear RGB in [0, 1].
+    /// Share of the arriving light that leaves again, linear RGB in [0, 1]; with a texture, what that is multiplied by.
     pub albedo: Vec3,
+    /// What the albedo is multiplied by from place to place.
+    pub texture: Option<Texture>,
 }
 
 /// Which faces of an object's triangles reflect light. The others absorb it, and look black.
@@ -135,6 +138,8 @@ pub struct Object {
     pub material: MaterialId,
     /// Which faces reflect.
     pub sides: Sides,
+    /// The level of its texture that the light transport looks at: [`crate::Detail::Transport`].
+    pub transport_level: u32,
     /// Its triangles in [`Geometry::triangles`].
     pub triangles: Range<u32>,
     /// Rigid motion from rest space (the object at its final size, neither turned nor moved) to the scene's space.
@@ -171,6 +176,8 @@ pub struct Geometry {
     pub vertices: Vec<Vec3>,
     /// The same vertices in the rest space of their object.
     pub rest_vertices: Arc<[Vec3]>,
+    /// Texture coordinates of the vertices, rows counted from the top; none at all where nothing has a texture.
+    pub uvs: Arc<[Vec2]>,
     /// Vertex indices, counter-clockwise seen from the front; those of one object are contiguous.
     pub triangles: Arc<[[u32; 3]]>,
     /// Unit geometric normal of the front of each triangle, in the scene's space.
@@ -190,6 +197,17 @@ impl Geometry {
     #[inline]
     pub fn rest_triangle(&self, id: u32) -> [Vec3; 3] {
         self.triangles[id as usize].map(|v| self.rest_vertices[v as usize])
+    }
+}
+
+impl Geometry {
+    /// The texture coordinates of the corners of triangle `id`; `None` in a scene without.
+    #[inline]
+    pub fn uv_triangle(&self, id: u32) -> Option<[Vec2; 3]> {
+        if self.uvs.is_empty() {
+            return None;
+        }
+        Some(self.triangles[id as usize].map(|v| self.uvs[v as usize]))
     }
 }
 
@@ -228,7 +246,7 @@ impl Scene {
         self.materials.binary_search_by(|m| m.name.as_str().cmp(name)).ok().map(|i| MaterialId(i as u32))
     }
 
-    /// The reflectance of an object, linear RGB.
+    /// The reflectance of an object, linear RGB; what its texture, if it has one, is multiplied by.
     #[inline]
     pub fn albedo(&self, object: ObjectId) -> Vec3 {
         self.materials[self.objects[object.0 as usize].material.0 as usize].albedo

@@ -178,7 +178,7 @@ fn the_hash_depends_on_content_not_on_place() {
 fn bad_files_are_explained() {
     for (obj, mtl, object, expected) in [
         ("f 1 2 3\n", MTL, "", "scene.obj: not a valid OBJ file: "),
-        ("v 1 2 x\n", MTL, "", "scene.obj: not a valid OBJ file: position parse error"),
+        ("v 1 2 x\n", MTL, "", "scene.obj: not a valid OBJ file: line 1: found \"x\", expected a number"),
         ("v 0 0 0\n", MTL, "", "scene.obj: no faces are left of it; check the file and `exclude`"),
         (OBJ, "newmtl white\nKd 1 x 1\n", "", "scene.mtl: material parse error"),
         (
@@ -195,7 +195,12 @@ fn bad_files_are_explained() {
             "material \"lamp\": found Ke [inf, 12, 4], expected numbers from 0 to 1e12",
         ),
         (&OBJ.replace("scene.mtl", "other.mtl"), MTL, "", "other.mtl cannot be read ("),
-        (&OBJ.replace("v 1 0 1", "v nan 0 1"), MTL, "", "object.it: found a vertex"),
+        (
+            &OBJ.replace("v 1 0 1", "v nan 0 1"),
+            MTL,
+            "",
+            "not a valid OBJ file: line 5: found \"nan\", expected a number",
+        ),
     ] {
         let error = Files::new(obj, mtl).build(object, "").unwrap_err().to_string();
         assert!(error.starts_with("x.toml:") && error.contains(expected), "{error}\n{expected}");
@@ -230,11 +235,35 @@ fn odd_materials_are_noticed() {
     assert!(scene.notices[0].contains("faces without a known material have albedo 0.5"));
 }
 
+/// Without a texture nothing is kept of texture coordinates; those that are not there are an error all the same.
 #[test]
-fn texture_coordinates_and_normals_are_passed_over() {
+fn texture_coordinates_and_normals_change_no_mesh_without_a_texture() {
     let plain = Files::new("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "").scene("", "");
-    let full = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/-9223372036854775808/1 3//1\n";
+    let full = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nf 1/1/1 2/-1/1 \\\n 3//1\ns 1\n";
     assert_eq!(Files::new(full, "").scene("", "").geometry, plain.geometry);
+    for (bad, expected) in [
+        (
+            "-9223372036854775808",
+            "line 6: it names texture coordinate -9223372036854775808, but there are 2 so far",
+        ),
+        ("3", "line 6: it names texture coordinate 3"),
+        ("0", "line 6: it names texture coordinate 0"),
+        ("x", "line 6: found \"x\", expected the number of a texture coordinate"),
+    ] {
+        let text = full.replace("2/-1/1 \\\n", &format!("2/{bad}/1 ")).replace("vn 0 0 1\n", "");
+        let error = Files::new(&text, "").build("", "").unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// Clear panes are not there for light, nor for the eye.
+#[test]
+fn light_passes_what_transmits() {
+    let scene = Files::new(OBJ, MTL).scene("", ", transmit = [\"lamp\"]");
+    assert_eq!(names(&scene), ["it/floor/white", "it/odd/white"]);
+    assert!(scene.lights.is_empty());
+    let error = Files::new(OBJ, MTL).build("", ", transmit = [\"lmap\"]").unwrap_err().to_string();
+    assert!(error.contains("transmit") && error.contains("lamp"), "{error}");
 }
 
 /// A quad with a corner pushed in is cut along the diagonal that stays inside.

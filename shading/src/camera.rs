@@ -35,6 +35,12 @@ impl Camera {
         valid.then(|| Self { position, forward, right, up: right.cross(forward), tan_half_fov })
     }
 
+    /// The width of a pixel in the middle of a picture of `height` rows, at distance 1.
+    #[inline]
+    pub fn pixel_width(&self, height: u32) -> f32 {
+        2.0 * self.tan_half_fov / height as f32
+    }
+
     /// Unit direction through picture coordinates (`x`, `y`) in pixels of a `width` × `height` picture; pixel (i, j)
     /// spans [i, i+1) × [j, j+1).
     #[inline]

@@ -16,6 +16,7 @@ pub mod patch;
 pub mod sampling;
 pub mod sobol;
 pub mod surface;
+pub mod texture;
 pub mod tone;
 pub mod wgsl;
 

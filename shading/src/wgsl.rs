@@ -3,7 +3,7 @@
 //! A twin has the file stem, names, parameter order and expression order of its Rust function. Constants are printed
 //! from Rust, never typed twice.
 
-use crate::{LightShape, distance_map, patch, surface, tone::ToneMap};
+use crate::{LightShape, distance_map, patch, surface, texture::Wrap, tone::ToneMap};
 use core::f32::consts::{FRAC_1_PI, PI};
 use std::fmt::Write;
 
@@ -25,11 +25,13 @@ pub const OCTAHEDRAL: &str = include_str!("../wgsl/octahedral.wgsl");
 pub const PATCH: &str = include_str!("../wgsl/patch.wgsl");
 /// Twin of [`crate::sobol`].
 pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
+/// Twin of [`crate::texture`]; the module that includes it has `texels: array<vec2u>`.
+pub const TEXTURE: &str = include_str!("../wgsl/texture.wgsl");
 /// Twin of [`crate::tone`].
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 10] = [
+pub const TWINS: [(&str, &str); 11] = [
     ("kernel", KERNEL),
     ("basis", BASIS),
     ("distance_map", DISTANCE_MAP),
@@ -39,6 +41,7 @@ pub const TWINS: [(&str, &str); 10] = [
     ("octahedral", OCTAHEDRAL),
     ("patch", PATCH),
     ("sobol", SOBOL),
+    ("texture", TEXTURE),
     ("tone", TONE),
 ];
 
@@ -74,6 +77,9 @@ pub fn constants() -> String {
     let _ = writeln!(text, "const PATCH_MAX_CORNERS: u32 = {}u;", patch::MAX_CORNERS);
     for (number, name) in LIGHT_KINDS.iter().enumerate() {
         let _ = writeln!(text, "const LIGHT_{name}: u32 = {number}u;");
+    }
+    for (wrap, name) in [(Wrap::Repeat, "REPEAT"), (Wrap::Mirror, "MIRROR"), (Wrap::Clamp, "CLAMP")] {
+        let _ = writeln!(text, "const TEXTURE_{name}: u32 = {}u;", wrap as u32);
     }
     for (number, map) in ToneMap::ALL.iter().enumerate() {
         let _ = writeln!(text, "const TONE_MAP_{}: u32 = {number}u;", map.name().to_uppercase());

@@ -192,9 +192,13 @@ impl Moved {
 
 /// Whether a path that hits an object is reflected as it was in another version.
 pub(crate) fn reflects_alike(old: &Scene, before: &Object, new: &Scene, after: &Object) -> bool {
-    let albedo = |scene: &Scene, object: &Object| scene.materials[object.material.0 as usize].albedo;
+    let (before_of, after_of) =
+        (&old.materials[before.material.0 as usize], &new.materials[after.material.0 as usize]);
     let sides = |object: &Object| [Side::Front, Side::Back].map(|side| object.sides.contains(side));
-    albedo(old, before) == albedo(new, after) && sides(before) == sides(after)
+    before_of.albedo == after_of.albedo
+        && sides(before) == sides(after)
+        && before_of.texture == after_of.texture
+        && (before_of.texture.is_none() || before.transport_level == after.transport_level)
 }
 
 /// What encloses an object; `None` for one without triangles.

@@ -20,7 +20,7 @@ use crate::{
 };
 use glam::Vec3;
 use photonstream_scene::{
-    Geometry, Scene, Side, Sides,
+    Detail, Geometry, Scene, Side, Sides,
     bvh::{Hit, Ray},
 };
 use photonstream_shading::{sampling, surface};
@@ -47,6 +47,14 @@ struct Reflection {
     albedo: Vec3,
     survival: f32,
     sides: Sides,
+    /// Whether albedo and survival depend on the place.
+    textured: bool,
+}
+
+impl Reflection {
+    fn new(albedo: Vec3, sides: Sides, textured: bool) -> Self {
+        Self { albedo, survival: albedo.max_element().min(MAX_SURVIVAL), sides, textured }
+    }
 }
 
 /// Sees what a tracer does; `()` sees nothing and costs nothing.
@@ -71,8 +79,8 @@ impl Tracer {
             .objects
             .iter()
             .map(|object| {
-                let albedo = scene.materials[object.material.0 as usize].albedo;
-                Reflection { albedo, survival: albedo.max_element().min(MAX_SURVIVAL), sides: object.sides }
+                let material = &scene.materials[object.material.0 as usize];
+                Reflection::new(material.albedo, object.sides, material.texture.is_some())
             })
             .collect();
         Self { geometry: Arc::clone(&scene.geometry), scene, owners, emitters, surfaces }
@@ -220,6 +228,17 @@ impl Tracer {
         }
     }
 
+    /// How light is reflected at (u, v) of a triangle.
+    #[inline]
+    fn reflection(&self, triangle: u32, uv: [f32; 2]) -> Reflection {
+        let surface = self.surfaces[self.geometry.object_of[triangle as usize].0 as usize];
+        if !surface.textured {
+            return surface;
+        }
+        let albedo = self.scene.albedo_at(triangle, uv, Detail::Transport);
+        Reflection::new(albedo, surface.sides, true)
+    }
+
     /// What becomes of a photon at its hit: its deposit, and if it survives the photon that goes on, from its new origin
     /// around the returned normal.
     #[inline]
@@ -249,7 +268,7 @@ impl Tracer {
         let mut arrive = |deposited| {
             points.push((photon.path, Vertex::hit(point, hit.triangle, side, deposited), [hit.u, hit.v]));
         };
-        let reflection = self.surfaces[self.geometry.object_of[hit.triangle as usize].0 as usize];
+        let reflection = self.reflection(hit.triangle, [hit.u, hit.v]);
         if !reflection.sides.contains(side) {
             counters.absorbed_back += 1;
             arrive(false);

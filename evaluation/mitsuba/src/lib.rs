@@ -9,6 +9,7 @@ mod ply;
 mod sensor;
 pub mod spot;
 mod surfaces;
+mod textures;
 
 use document::Document;
 use photonstream_scene::Scene;
@@ -54,6 +55,7 @@ pub enum ExportError {
 ///   from the same seed: in `llvm_ad_rgb` their first reflections then are the same samples;
 /// - `full.xml`: the same without a limit of depth, our layer `full`;
 /// - `meshes/*.ply`: one mesh for each object;
+/// - `textures/*.pfm`: what albedos are multiplied by, and where holes are, at four times the resolution;
 /// - `scene.toml`: the scene as our own programs read it, at the moment that is exported.
 ///
 /// # Errors
@@ -77,6 +79,14 @@ pub fn export(scene: &Scene, folder: &Path) -> Result<Exported, ExportError> {
     write(folder.join("direct.xml"), document::variant(DIRECT_MAX_DEPTH).as_bytes())?;
     write(folder.join("full.xml"), document::variant(-1).as_bytes())?;
     write(folder.join("scene.toml"), scene.resolved_text.as_bytes())?;
+    let textures = textures::files(scene);
+    if !textures.is_empty() {
+        let path = folder.join("textures");
+        fs::create_dir_all(&path).map_err(|source| ExportError::Write { path, source })?;
+    }
+    for (name, bytes) in textures {
+        write(folder.join(name), &bytes)?;
+    }
     for (index, object) in scene.objects.iter().enumerate() {
         let bytes = ply::encode(&scene.geometry, object.triangles.clone());
         write(folder.join(surfaces::mesh_file(index, &object.name)), &bytes)?;

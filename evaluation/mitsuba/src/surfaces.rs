@@ -2,11 +2,11 @@
 
 use super::{
     document::{Document, identifier},
-    spot,
+    spot, textures,
 };
 use core::f32::consts::PI;
 use glam::Vec3;
-use photonstream_scene::{ObjectId, Scene, Side, Sides};
+use photonstream_scene::{Material, ObjectId, Scene, Side, Sides};
 use photonstream_shading::{Light, LightShape};
 
 /// The mesh of object `index`, seen from the folder of `scene.xml`.
@@ -26,7 +26,8 @@ pub(crate) fn write(scene: &Scene, document: &mut Document) -> usize {
         document.property("string", "filename", mesh_file(index, &object.name));
         // Triangles are flat: no normals made up between neighbours.
         document.property("boolean", "face_normals", "true");
-        reflectance(document, object.sides, scene.albedo(id));
+        let material = object.material.0 as usize;
+        reflectance(document, object.sides, (material, &scene.materials[material]));
         let radiance = scene.emitted_radiance(id, Side::Front);
         if radiance != Vec3::ZERO {
             emitting += 1;
@@ -40,22 +41,34 @@ pub(crate) fn write(scene: &Scene, document: &mut Document) -> usize {
 }
 
 /// `diffuse` reflects on the front alone and looks black from behind, as [`Sides::Front`] does.
-fn reflectance(document: &mut Document, sides: Sides, albedo: Vec3) {
-    let diffuse = |document: &mut Document, albedo| {
+fn reflectance(document: &mut Document, sides: Sides, (index, material): (usize, &Material)) {
+    let diffuse = |document: &mut Document, is_black: bool| {
         document.begin("bsdf", &[("type", &"diffuse")]);
-        document.rgb("reflectance", albedo);
+        match is_black {
+            true => textures::black(document),
+            false => textures::reflectance(document, index, material),
+        }
         document.end();
     };
+    let mask = material.texture.as_ref().filter(|texture| texture.cutoff.is_some());
+    if let Some(texture) = mask {
+        document.begin("bsdf", &[("type", &"mask")]);
+        textures::opacity(document, index, texture);
+    }
     if sides == Sides::Front {
-        return diffuse(document, albedo);
+        diffuse(document, false);
+    } else {
+        document.begin("bsdf", &[("type", &"twosided")]);
+        if sides == Sides::Back {
+            // The first of two is the front.
+            diffuse(document, true);
+        }
+        diffuse(document, false);
+        document.end();
     }
-    document.begin("bsdf", &[("type", &"twosided")]);
-    if sides == Sides::Back {
-        // The first of two is the front.
-        diffuse(document, Vec3::ZERO);
+    if mask.is_some() {
+        document.end();
     }
-    diffuse(document, albedo);
-    document.end();
 }
 
 /// All lights that are no surface and switched on; returns of how many emitters they consist.

@@ -7,7 +7,7 @@
 use crate::EvaluateError;
 use glam::Vec3;
 use photonstream_renderer::{Vsl, VslSet};
-use photonstream_scene::{Scene, Side, bvh::Ray};
+use photonstream_scene::{Detail, Scene, Side, bvh::Ray};
 use photonstream_shading::{sampling, sobol::Sequence, surface};
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ fn follow(scene: &Scene, power: &Powers, sequence: Sequence, index: u64) -> Vec<
         let front = scene.geometry.normals[hit.triangle as usize];
         let side = if front.dot(direction) < 0.0 { Side::Front } else { Side::Back };
         let id = scene.geometry.object_of[hit.triangle as usize];
-        let albedo = scene.albedo(id);
+        let albedo = scene.albedo_at(hit.triangle, [hit.u, hit.v], Detail::Finest);
         let survival = albedo.max_element().min(MAX_SURVIVAL);
         if !scene.objects[id.0 as usize].sides.contains(side) || survival <= 0.0 {
             break;

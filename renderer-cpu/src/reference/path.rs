@@ -45,7 +45,7 @@ pub(crate) fn radiance(
         beta *= surface.albedo / survival;
         let direction = sampling::cosine_hemisphere(surface.normal, sample.next_2d());
         *rays += 1;
-        let Some(next) = surface::first(scene, surface.ray_origin, direction) else { break };
+        let Some(next) = surface::first(scene, surface.ray_origin, direction, 0.0) else { break };
         if next.albedo == Vec3::ZERO {
             break;
         }

@@ -37,23 +37,32 @@ pub(super) struct Context<'c, 'a> {
 struct Table<'c, 'a> {
     path: &'c str,
     exclude: &'c [String],
+    transmit: &'c [String],
     frame: Frame,
     field: Field<'a>,
     load: fn(&Path, Frame, &[String]) -> Loaded,
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
-    if let Some(ObjConfig { path, up_axis, unit_m, exclude }) = &mut object.obj {
+    if let Some(ObjConfig { path, up_axis, unit_m, exclude, transmit }) = &mut object.obj {
         let field = field.key("obj");
         let frame = Frame::resolve(up_axis, unit_m, &field)?;
-        let exclude = exclude.get_or_insert_default();
-        return Ok(Table { path, exclude, frame, field, load: |path, frame, _| load_obj(path, frame) });
+        let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
+        return Ok(Table {
+            path,
+            exclude,
+            transmit,
+            frame,
+            field,
+            load: |path, frame, _| load_obj(path, frame),
+        });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, exclude } = gltf;
+    let GltfConfig { path, up_axis, unit_m, exclude, transmit } = gltf;
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
-    Ok(Table { path, exclude: exclude.get_or_insert_default(), frame, field, load: load_gltf })
+    let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
+    Ok(Table { path, exclude, transmit, frame, field, load: load_gltf })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -85,7 +94,7 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, frame, field, load } = table(object, context.field)?;
+    let Table { path, exclude, transmit, frame, field, load } = table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
     let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
@@ -98,7 +107,9 @@ pub(super) fn read(
         }
         context.notices.push(format!("object \"{name}\": {problem}; its `material` is used instead"));
     }
-    let excluded = excluded(&import, exclude, &field.key("exclude"))?;
+    let mut excluded = named(&import, exclude, &field.key("exclude"))?;
+    // What lets all light pass straight through is not there for it.
+    excluded.extend(named(&import, transmit, &field.key("transmit"))?);
     context.inputs.files.extend(import.files.iter().cloned());
     context.inputs.contents.insert(name.to_owned(), (absolute, import.content));
     let of_materials = if overriding.is_none() { import.material_notices.as_slice() } else { &[] };
@@ -139,7 +150,7 @@ fn limit_emitters(parts: &mut [Part<'_>], notices: &mut Vec<String>) {
     }
     let power_of_face = |part: &Part<'_>| {
         let Some(Emitter { strength: Strength::Radiance(radiance), .. }) = part.emitter else { return 0.0 };
-        let Mesh { vertices, triangles } = &part.mesh;
+        let Mesh { vertices, triangles, .. } = &part.mesh;
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|i| vertices[i as usize]);
             (b - a).cross(c - a).length()
@@ -197,14 +208,19 @@ fn part<'a>(
     if emits && sides == Sides::Both {
         context.notices.push(format!("object \"{part_name}\": emits from its front only"));
     }
+    let mut has_texture = false;
     let material = match override_material {
         Some(material) => material.to_owned(),
         None => {
             let material = format!("{name}/{material}");
-            context.materials.add(material.clone(), surface.albedo);
+            has_texture = surface.texture.is_some();
+            context.materials.add(material.clone(), surface.albedo, surface.texture);
             material
         }
     };
+    if !has_texture {
+        mesh.uvs.clear();
+    }
     Part {
         name: part_name,
         field: context.field.clone(),
@@ -237,6 +253,7 @@ fn surface(
         }
         return Ok(ImportedMaterial {
             albedo: DVec3::splat(DEFAULT_ALBEDO),
+            texture: None,
             radiance: DVec3::ZERO,
             two_sided: false,
         });
@@ -262,8 +279,8 @@ fn surface(
     Ok(surface)
 }
 
-/// The `group/material` pairs to leave out.
-fn excluded(import: &Import, names: &[String], field: &Field<'_>) -> Result<BTreeSet<String>, SceneError> {
+/// The `group/material` pairs that `names` name.
+fn named(import: &Import, names: &[String], field: &Field<'_>) -> Result<BTreeSet<String>, SceneError> {
     let mut excluded = BTreeSet::new();
     for name in names {
         let mut known: BTreeSet<String> = import.nodes.keys().cloned().collect();

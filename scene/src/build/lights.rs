@@ -194,7 +194,7 @@ fn read_rectangle<'a>(
     let albedo = *rectangle.albedo.get_or_insert(OneOrThree([0.0; 3]));
     let albedo = field.key("albedo").albedo(albedo)?;
     let material = format!("{name}/emitter");
-    materials.add(material.clone(), albedo);
+    materials.add(material.clone(), albedo, None);
     let RectangleConfig { position_m, rotation_deg, scale, .. } = rectangle;
     let placement = Placement::resolve(position_m, rotation_deg, scale, &field)?;
     let mesh = read_quad([rectangle.corner_m, rectangle.edge_u_m, rectangle.edge_v_m], &field)?;

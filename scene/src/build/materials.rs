@@ -4,6 +4,7 @@ use super::check_name;
 use crate::{
     config::{Field, MaterialConfig},
     error::{SceneError, nearest},
+    picture::Texture,
     scene::Material,
 };
 use glam::DVec3;
@@ -11,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// All materials, with the names they were given.
 pub(super) struct Materials {
-    by_name: BTreeMap<String, DVec3>,
+    by_name: BTreeMap<String, (DVec3, Option<Texture>)>,
 }
 
 impl Materials {
@@ -23,7 +24,7 @@ impl Materials {
         for (name, material) in table {
             let field = field.key(name);
             check_name(name, &field)?;
-            by_name.insert(name.clone(), field.key("albedo").albedo(material.albedo)?);
+            by_name.insert(name.clone(), (field.key("albedo").albedo(material.albedo)?, None));
         }
         Ok(Self { by_name })
     }
@@ -43,12 +44,17 @@ impl Materials {
     }
 
     /// Adds a generated material.
-    pub(super) fn add(&mut self, name: String, albedo: DVec3) {
-        self.by_name.insert(name, albedo);
+    pub(super) fn add(&mut self, name: String, albedo: DVec3, texture: Option<Texture>) {
+        self.by_name.insert(name, (albedo, texture));
     }
 
     /// The materials ordered by name.
     pub(super) fn into_list(self) -> Vec<Material> {
-        self.by_name.into_iter().map(|(name, albedo)| Material { name, albedo: albedo.as_vec3() }).collect()
+        let material = |(name, (albedo, texture)): (String, (DVec3, _))| Material {
+            name,
+            albedo: albedo.as_vec3(),
+            texture,
+        };
+        self.by_name.into_iter().map(material).collect()
     }
 }

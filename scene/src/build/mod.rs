@@ -12,12 +12,13 @@ mod steady_state;
 use crate::{
     animation,
     bake::{self, Baked, BakedEmitter, Part, Strength},
-    bvh::SceneBvh,
+    bvh::{Holes, SceneBvh},
     config::{Document, Field, LightConfig, SceneConfig},
     error::SceneError,
     features::Features,
     import::AssetRoots,
     scene::{LightId, ObjectId, Scene, SceneLight},
+    texturing,
 };
 use glam::DVec3;
 pub(crate) use lights::not_one_of;
@@ -107,12 +108,13 @@ impl SceneConfig {
         let Baked { geometry, objects, rest_meshes, poses, bounds, .. } = baked;
 
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
-        let bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
+        let mut bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
+        bvh.set_holes(Holes::find(&geometry, &objects, &materials));
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
         notices.extend(steady_state::notice(&features, &objects, &materials));
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents);
-        Ok(Scene {
+        let mut scene = Scene {
             name,
             hash,
             resolved_text,
@@ -132,7 +134,10 @@ impl SceneConfig {
             files: inputs.files.into(),
             rest_meshes: rest_meshes.into(),
             poses,
-        })
+        };
+        let vsl_area_m2 = scene.reflecting_area_m2() / scene.streaming.vsls.max(1) as f64;
+        texturing::choose_levels(&mut scene, vsl_area_m2 as f32);
+        Ok(scene)
     }
 }
 

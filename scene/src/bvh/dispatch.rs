@@ -79,7 +79,7 @@ impl<L: Lanes, const ANY: bool> WithSimd for With<L, Query<'_, ANY>> {
 impl<const ANY: bool> Query<'_, ANY> {
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Nearest {
-        let ray = RayLanes::new(l, self.frame);
+        let ray = RayLanes::new(l, self.frame, self.scene.holes.as_deref());
         let mut nearest = Nearest::none(self.frame.t_max);
         let stack = (self.stack, 0);
         match self.scene.parts.as_slice() {

@@ -19,7 +19,7 @@
 //! - No constant epsilon. Zero components of a direction are replaced, in box tests, by 2⁻⁴⁰ of the largest one;
 //!   directions are scaled by a power of two, exactly, so that lengths from 10⁻³⁸ to 10³⁸ behave alike.
 //!
-//! Zero-area triangles are never hit. Rays with NaN or infinite components, zero direction, `t_max` ≤ 0 or an origin
+//! Where a triangle's texture has a hole it is not hit. Zero-area triangles are never hit. Rays with NaN or infinite components, zero direction, `t_max` ≤ 0 or an origin
 //! beyond [`MAX_COORDINATE`] hit nothing. No ray makes a query panic.
 //!
 //! # Layout
@@ -43,6 +43,7 @@
 mod collapse;
 mod dispatch;
 mod error;
+mod holes;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86;
@@ -62,6 +63,7 @@ mod tests;
 use glam::Vec3;
 
 pub use error::BvhError;
+pub(crate) use holes::Holes;
 pub use part::Bvh;
 pub use ray_frame::{MAX_COORDINATE, NODE_PAD_ORIGIN, SMALLEST_COMPONENT, TRIANGLE_PAD};
 pub use scene_bvh::SceneBvh;

@@ -13,7 +13,7 @@ use super::part::{Bvh, binary_tree};
 use super::ray_frame::RayFrame;
 use super::triangle::Nearest;
 use super::walk::STACK_OF_THREAD;
-use super::{Hit, Ray};
+use super::{Hit, Holes, Ray};
 
 /// Parts under a small top level; a clone shares the parts.
 #[derive(Clone, Debug)]
@@ -24,6 +24,7 @@ pub struct SceneBvh {
     pub(super) lo: Vec3,
     pub(super) hi: Vec3,
     pub(super) instructions: Instructions,
+    pub(super) holes: Option<Arc<Holes>>,
 }
 
 /// A part's triangles by number, and their structure.
@@ -54,6 +55,7 @@ impl SceneBvh {
             lo: Vec3::ZERO,
             hi: Vec3::ZERO,
             instructions: detect(),
+            holes: None,
         };
         scene.build_top();
         scene
@@ -87,6 +89,16 @@ impl SceneBvh {
         if any {
             self.build_top();
         }
+    }
+
+    /// Takes over where triangles have holes; they have none after [`Self::build`].
+    pub(crate) fn set_holes(&mut self, holes: Option<Holes>) {
+        self.holes = holes.map(Arc::new);
+    }
+
+    /// Whether any triangle has holes.
+    pub fn has_holes(&self) -> bool {
+        self.holes.is_some()
     }
 
     fn build_top(&mut self) {

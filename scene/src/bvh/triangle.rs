@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::holes::Holes;
 use super::lanes::{F32x8, Lanes, U32x8, WIDTH};
 use super::ray_frame::{MAX_COORDINATE, RayFrame, TRIANGLE_PAD};
 
@@ -116,13 +117,22 @@ impl<L: Lanes> ShearLanes<L> {
 
     /// Offers every hit among the packet's triangles to `nearest`.
     #[inline(always)]
-    pub(super) fn intersect(&self, l: L, frame: &RayFrame, packet: &Packet, nearest: &mut Nearest) {
+    pub(super) fn intersect(
+        &self,
+        l: L,
+        (frame, holes): (&RayFrame, Option<&Holes>),
+        packet: &Packet,
+        nearest: &mut Nearest,
+    ) {
         let mut candidates = self.candidates(l, frame, packet);
         while candidates != 0 {
             let lane = candidates.trailing_zeros() as usize % WIDTH;
             candidates &= candidates - 1;
             if let Some(hit) = resolve(frame, &packet.triangle(lane)) {
-                nearest.offer(packet.ids.0[lane], hit);
+                let id = packet.ids.0[lane];
+                if holes.is_none_or(|holes| !holes.contain(id, hit[1], hit[2])) {
+                    nearest.offer(id, hit);
+                }
             }
         }
     }

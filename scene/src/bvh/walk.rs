@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::holes::Holes;
 use super::lanes::{Lanes, WIDTH};
 use super::node::{LEAF, NONE, Node, SlabLanes};
 use super::ray_frame::RayFrame;
@@ -43,14 +44,15 @@ pub(super) trait Leaves<L: Lanes> {
 /// A ray with its constants in registers.
 pub(super) struct RayLanes<'a, L: Lanes> {
     pub(super) frame: &'a RayFrame,
+    holes: Option<&'a Holes>,
     slabs: SlabLanes<L>,
     shear: ShearLanes<L>,
 }
 
 impl<'a, L: Lanes> RayLanes<'a, L> {
     #[inline(always)]
-    pub(super) fn new(l: L, frame: &'a RayFrame) -> Self {
-        Self { frame, slabs: SlabLanes::new(l, frame), shear: ShearLanes::new(l, frame) }
+    pub(super) fn new(l: L, frame: &'a RayFrame, holes: Option<&'a Holes>) -> Self {
+        Self { frame, holes, slabs: SlabLanes::new(l, frame), shear: ShearLanes::new(l, frame) }
     }
 }
 
@@ -64,7 +66,7 @@ impl<L: Lanes> Leaves<L> for [Packet] {
         _: (&mut Stack, usize),
         nearest: &mut Nearest,
     ) {
-        ray.shear.intersect(l, ray.frame, &self[index as usize], nearest);
+        ray.shear.intersect(l, (ray.frame, ray.holes), &self[index as usize], nearest);
     }
 }
 

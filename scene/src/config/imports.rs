@@ -26,6 +26,9 @@ pub struct ObjConfig {
     pub unit_m: Option<f64>,
     /// Groups, materials or `group/material` pairs to leave out.
     pub exclude: Option<Vec<String>>,
+    /// Groups, materials or `group/material` pairs of clear panes: light passes straight through, and nothing is seen of
+    /// them.
+    pub transmit: Option<Vec<String>>,
 }
 
 /// `ply`: the faces of a PLY file as one object.
@@ -55,6 +58,9 @@ pub struct GltfConfig {
     pub unit_m: Option<f64>,
     /// Nodes (with all below them), materials or `node/material` pairs to leave out.
     pub exclude: Option<Vec<String>>,
+    /// Nodes, materials or `node/material` pairs of clear panes: light passes straight through, and nothing is seen of
+    /// them.
+    pub transmit: Option<Vec<String>>,
 }
 
 impl ObjectConfig {

@@ -33,6 +33,7 @@ fn every_key() -> SceneConfig {
             up_axis: Some(UpAxis::Z),
             unit_m: Some(1.0),
             exclude: Some(vec!["x".into()]),
+            transmit: Some(vec!["x".into()]),
         }),
         ply: Some(PlyConfig { path: "p".into(), up_axis: Some(UpAxis::Z), unit_m: Some(1.0) }),
         gltf: Some(GltfConfig {
@@ -40,6 +41,7 @@ fn every_key() -> SceneConfig {
             up_axis: Some(UpAxis::Z),
             unit_m: Some(1.0),
             exclude: Some(vec!["x".into()]),
+            transmit: Some(vec!["x".into()]),
         }),
     };
     let light = LightConfig {

@@ -9,6 +9,7 @@ mod values;
 use crate::{
     bake,
     build::area_light,
+    bvh::Holes,
     config::{Document, Field, MAX_LENGTH_M},
     error::{SceneError, nearest},
     pose::{self, Pose, RestMesh},
@@ -154,6 +155,10 @@ impl SceneEdit {
         }
         let parts = moves.iter().map(|(id, _)| id.0 as usize);
         scene.bvh.rebuild_parts(parts, &geometry.vertices, &geometry.triangles);
+        if scene.bvh.has_holes() {
+            // A mesh turned inside out counts its corners the other way round.
+            scene.bvh.set_holes(Holes::find(geometry, &scene.objects, &scene.materials));
+        }
         scene.bounds = bake::sphere_around(&geometry.vertices);
         for light in &mut scene.lights {
             let (Some(object), Some((face, strength))) = (light.object, light.face) else { continue };

@@ -5,6 +5,7 @@ mod beside;
 mod frame;
 mod gltf;
 mod obj;
+mod pictures;
 mod ply;
 mod polygons;
 mod texture;
@@ -16,7 +17,7 @@ pub(crate) use gltf::load_gltf;
 pub(crate) use obj::{NO_MATERIAL, load_obj};
 pub(crate) use ply::read_ply;
 
-use crate::{bake::EmitterFace, primitives::Mesh};
+use crate::{bake::EmitterFace, picture::Texture, primitives::Mesh};
 use glam::DVec3;
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -73,8 +74,10 @@ pub(crate) struct Group {
 /// Reflectance and emission of a material of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ImportedMaterial {
-    /// Share of light reflected, times the mean of its texture; white where the file gives none.
+    /// Share of light reflected, apart from the texture; white where the file gives none.
     pub(crate) albedo: DVec3,
+    /// What that is multiplied by from place to place.
+    pub(crate) texture: Option<Texture>,
     /// Emitted radiance, W m⁻² sr⁻¹.
     pub(crate) radiance: DVec3,
     /// Whether both sides reflect.

@@ -10,13 +10,15 @@ pub(crate) use quad::quad;
 pub(crate) use sphere::sphere;
 pub(crate) use torus_knot::{TorusKnot, torus_knot};
 
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 
 /// A triangle mesh in an object's own coordinates, m; counter-clockwise seen from the front.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Mesh {
     pub(crate) vertices: Vec<DVec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the vertices, rows counted from the top; none at all for most meshes.
+    pub(crate) uvs: Vec<Vec2>,
 }
 
 /// Sine and cosine of `turn` full turns; exact at multiples of a quarter, so that right angles stay right.

@@ -5,3 +5,4 @@ mod bad;
 mod files;
 mod geometry;
 mod surfaces;
+mod textures;

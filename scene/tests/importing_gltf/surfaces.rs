@@ -1,13 +1,11 @@
 //! Checks materials, textures, emitters and lights.
 
 use super::files::*;
-use base64::{Engine, prelude::BASE64_STANDARD};
 use glam::Vec3;
-use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use photonstream_scene::{Scene, Side, Sides};
 use photonstream_shading::LightShape;
 use serde_json::{Value, json};
-use std::{f32::consts::PI, fs, io::Cursor};
+use std::f32::consts::PI;
 
 /// 683 · 10 cd m⁻² in red are 10 W m⁻² sr⁻¹; two triangles of a square are one light.
 #[test]
@@ -124,56 +122,6 @@ fn lights_come_in_watts_and_follow_their_node() {
     );
 }
 
-/// A picture of half black, half white pixels: one half in linear light.
-#[test]
-fn textures_count_by_their_mean() {
-    let picture = RgbImage::from_fn(8, 8, |x, _| if x < 4 { Rgb([0; 3]) } else { Rgb([255; 3]) });
-    let encoded = |format| {
-        let mut out = Cursor::new(Vec::new());
-        DynamicImage::from(picture.clone()).write_to(&mut out, format).unwrap();
-        out.into_inner()
-    };
-    let png = encoded(ImageFormat::Png);
-    let textured = |image: Value| {
-        with(&[
-            ("/materials/0/pbrMetallicRoughness/baseColorTexture", json!({ "index": 0 })),
-            ("/textures", json!([{ "source": 0 }])),
-            ("/images", json!([image])),
-        ])
-    };
-    let half = Vec3::new(0.25, 0.125, 0.0625);
-    let notice =
-        "object \"it\": textures are not modelled yet: their mean colour times the factor is the albedo";
-    let albedo = |files: &Files, notices: &[&str]| {
-        let scene = files.scene();
-        assert_eq!(scene.notices, notices);
-        scene.albedo(scene.object("it/square/paint").unwrap())
-    };
-    let inline = Files::new(&textured(
-        json!({ "uri": format!("data:image/png;base64,{}", BASE64_STANDARD.encode(&png)) }),
-    ));
-    assert_eq!(albedo(&inline, &[notice]), half);
-    let beside = Files::new(&textured(json!({ "uri": "a.jpg" })));
-    fs::write(beside.0.path().join("a.jpg"), encoded(ImageFormat::Jpeg)).unwrap();
-    // JPEG is lossy, but a block of two halves comes out within a few steps of 255.
-    assert!((albedo(&beside, &[notice]) - half).length() < 0.02);
-    let mut file = textured(json!({ "bufferView": 2, "mimeType": "image/png" }));
-    let mut data = bytes();
-    data.extend(&png);
-    file["buffers"][0] = json!({ "byteLength": data.len(), "uri": data_uri(&data) });
-    let view = json!({ "buffer": 0, "byteOffset": 72, "byteLength": png.len() });
-    file["bufferViews"].as_array_mut().unwrap().push(view);
-    assert_eq!(albedo(&Files::new(&file), &[notice]), half);
-    // One that is not there is told, and the factor used alone.
-    let scene = Files::new(&textured(json!({ "uri": "b.png" }))).scene();
-    assert_eq!(scene.albedo(scene.object("it/square/paint").unwrap()), half * 2.0);
-    assert!(scene.notices[0].contains("b.png cannot be read ("), "{:?}", scene.notices);
-    // A material of the object's own needs no texture, and no notice.
-    let scene = inline.build("material = \"grey\"", "").unwrap();
-    assert_eq!(scene.albedo(scene.object("it/square/paint").unwrap()), Vec3::splat(0.3));
-    assert!(scene.notices.is_empty());
-}
-
 #[test]
 fn double_sided_materials_reflect_on_both_sides_unless_told_otherwise() {
     let files = Files::new(&with(&[("/materials/0/doubleSided", json!(true))]));
@@ -204,7 +152,7 @@ fn what_is_passed_over_is_told_once() {
         "object \"it\": extensions are passed over: KHR_materials_clearcoat",
         "object \"it\": morph targets are not read",
         "object \"it\": colours of vertices are not read",
-        "object \"it\": transparency is not modelled: all is opaque",
+        "object \"it\": material \"paint\": what is blended is opaque; `transmit` lets light pass where it is clear",
         "object \"it\": all surfaces are matt: metal, roughness and normal maps are passed over",
         "object \"it/dot/paint\": no triangle has an area; it was left out",
     ] {

@@ -76,7 +76,7 @@ impl Tracer {
         for (&vertex, &uv) in known.vertices.iter().zip(known.uvs) {
             wave.points.push((path, vertex, uv));
             let Event::Hit { triangle, side, deposited } = vertex.event() else { continue };
-            let reflection = self.surfaces[self.geometry.object_of[triangle as usize].0 as usize];
+            let reflection = self.reflection(triangle, uv);
             let throughput = photon.throughput * reflection.albedo;
             if deposited && let Some(owner) = self.owners.owner(triangle, side, uv[0], uv[1]) {
                 wave.events.extend(Deposit::new(owner.0, throughput).map(|deposit| (path, deposit)));

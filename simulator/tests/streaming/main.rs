@@ -12,3 +12,4 @@ mod service;
 mod service_edits;
 mod split;
 mod support;
+mod textured;

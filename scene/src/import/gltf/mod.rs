@@ -18,6 +18,7 @@ use accessor::Accessors;
 use container::Container;
 use glam::DVec3;
 use materials::Materials;
+pub(super) use primitive::MAX_UV;
 use std::{collections::BTreeMap, path::Path};
 
 /// Lumens of a watt, which candela, lux and nits of a file are divided by. Source: the definition of the candela (SI).
@@ -55,10 +56,12 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
         let place = |point: DVec3| frame.apply(node.world.transform_point3(point));
         for (number, primitive) in root.meshes[mesh.value()].primitives.iter().enumerate() {
             let at = |problem| format!("node \"{}\", primitive {number}: {problem}", node.name);
-            let Some(mut surface) = primitive::read(primitive, &accessors, left).map_err(at)? else {
+            if !primitive::is_surface(primitive) {
                 points_and_lines += 1;
                 continue;
-            };
+            }
+            let (material, found) = materials.of(primitive, &accessors, &mut beside)?;
+            let mut surface = primitive::read(primitive, &accessors, left, found.uvs).map_err(at)?;
             left -= surface.read;
             if is_mirrored {
                 surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -69,8 +72,7 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
                     return Err(at(format!("a position is not finite: {vertex}")));
                 }
             }
-            let (material, emits) = materials.of(primitive, &accessors, &mut beside)?;
-            primitive::append(groups.entry((node.name.clone(), material)).or_default(), surface, emits);
+            primitive::append(groups.entry((node.name.clone(), material)).or_default(), surface, found.emits);
         }
     }
     groups.retain(|_, group| !group.mesh.triangles.is_empty());

@@ -2,7 +2,7 @@
 
 use super::{Group, accessor::Accessors};
 use crate::{bake::EmitterFace, import::polygons::is_parallelogram};
-use glam::DVec3;
+use glam::{DAffine2, DVec2, DVec3, Vec2};
 use gltf::json::{
     accessor::Type,
     mesh::{Mode, Primitive, Semantic},
@@ -10,16 +10,39 @@ use gltf::json::{
 };
 use std::collections::HashMap;
 
+/// Largest texture coordinate: beyond it f32 has no fraction to speak of.
+pub(in crate::import) const MAX_UV: f32 = 1e5;
+
+/// Which of a primitive's texture coordinates a material uses, and the map from them to those of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Uvs {
+    pub(super) set: u32,
+    pub(super) map: DAffine2,
+}
+
+impl Uvs {
+    fn of(&self, uv: [f64; 2]) -> Vec2 {
+        self.map.transform_point2(DVec2::from_array(uv)).as_vec2()
+    }
+}
+
 /// The triangles of a primitive and the vertices that they use.
 #[derive(Debug, Default)]
 pub(super) struct Surface {
     pub(super) vertices: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the vertices, where they were asked for.
+    pub(super) uvs: Vec<Vec2>,
     /// How many were looked at, those that only turn a strip included.
     pub(super) read: usize,
 }
 
-/// Reads the triangles of a primitive, at most `most` of them; `None` for points and lines.
+/// Whether a primitive has triangles, no points or lines.
+pub(super) fn is_surface(primitive: &Primitive) -> bool {
+    matches!(primitive.mode.unwrap(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
+}
+
+/// Reads the triangles of a primitive, at most `most` of them, with the texture coordinates `uvs`.
 ///
 /// # Errors
 /// A sentence on what is wrong with it.
@@ -27,11 +50,9 @@ pub(super) fn read(
     primitive: &Primitive,
     accessors: &Accessors<'_>,
     most: usize,
-) -> Result<Option<Surface>, String> {
+    uvs: Option<Uvs>,
+) -> Result<Surface, String> {
     let mode = primitive.mode.unwrap();
-    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-        return Ok(None);
-    }
     let positions =
         primitive.attributes.get(&Checked::Valid(Semantic::Positions)).ok_or("it has no POSITION")?;
     let positions = accessors.elements::<3>(*positions, Type::Vec3)?;
@@ -40,6 +61,23 @@ pub(super) fn read(
     if indices.as_ref().is_some_and(|indices| !indices.are_whole()) {
         return Err("its indices are not whole numbers".into());
     }
+    let coordinates = uvs.and_then(|uvs| {
+        let accessor = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(uvs.set)))?;
+        Some((accessors.elements::<2>(*accessor, Type::Vec2), uvs))
+    });
+    let coordinates = match coordinates {
+        Some((elements, uvs)) => {
+            let elements = elements?;
+            if elements.count < positions.count {
+                return Err(format!(
+                    "{} texture coordinates for {} vertices",
+                    elements.count, positions.count
+                ));
+            }
+            Some((elements, uvs))
+        }
+        None => None,
+    };
     let corners = indices.as_ref().map_or(positions.count, |indices| indices.count);
     let number = match mode {
         Mode::Triangles => corners / 3,
@@ -67,11 +105,18 @@ pub(super) fn read(
         surface.triangles.push(triangle.map(|n| {
             *own.entry(n).or_insert_with(|| {
                 surface.vertices.push(DVec3::from_array(positions.get(n)));
+                if let Some((elements, uvs)) = &coordinates {
+                    surface.uvs.push(uvs.of(elements.get(n)));
+                }
                 surface.vertices.len() as u32 - 1
             })
         }));
     }
-    Ok(Some(surface))
+    let is_usable = |uv: &Vec2| uv.is_finite() && uv.abs().max_element() <= MAX_UV;
+    if let Some(bad) = surface.uvs.iter().find(|uv| !is_usable(uv)) {
+        return Err(format!("texture coordinates {bad}, expected at most {MAX_UV}"));
+    }
+    Ok(surface)
 }
 
 /// The corners of triangle `i`.
@@ -86,6 +131,13 @@ fn corners_of(mode: Mode, i: usize) -> [usize; 3] {
 /// Adds a surface to a group, with its faces if it emits.
 pub(super) fn append(group: &mut Group, surface: Surface, emits: bool) {
     let first = group.mesh.vertices.len() as u32;
+    let uvs = &mut group.mesh.uvs;
+    if !surface.uvs.is_empty() || !uvs.is_empty() {
+        // Primitives without have texel (0, 0) everywhere.
+        uvs.resize(first as usize, Vec2::ZERO);
+        uvs.extend(&surface.uvs);
+        uvs.resize(first as usize + surface.vertices.len(), Vec2::ZERO);
+    }
     group.mesh.vertices.extend(surface.vertices);
     let triangles = surface.triangles.into_iter().map(|t| t.map(|i| i + first));
     let start = group.mesh.triangles.len();

@@ -7,13 +7,13 @@ const READ: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_mesh_quantization",
+    "KHR_texture_transform",
     // Says only that a material is not lit, which here it is.
     "KHR_materials_unlit",
 ];
 
 /// Extensions without which the geometry is still right.
-const PASSED_OVER: &[&str] =
-    &["KHR_texture_transform", "KHR_materials_", "EXT_texture_", "KHR_texture_basisu", "MSFT_texture_dds"];
+const PASSED_OVER: &[&str] = &["KHR_materials_", "EXT_texture_", "KHR_texture_basisu", "MSFT_texture_dds"];
 
 /// What is passed over of a file, one sentence each.
 ///

@@ -1,0 +1,50 @@
+// Turns triangles with textures into the G-buffer, and into the texture's colour at each pixel.
+
+@group(0) @binding(1) var<storage, read> texels: array<vec2u>;
+@group(0) @binding(2) var<storage, read> layouts: array<TextureLayout>;
+
+struct Corner {
+    // The same bits as in forward.wgsl, which draws at equal depth.
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat, either) anchor: vec3f,
+    @location(1) @interpolate(flat, either) normal: vec3f,
+    @location(2) @interpolate(flat, either) object: u32,
+    @location(3) uv: vec2f,
+    @location(4) @interpolate(flat, either) density: f32,
+}
+
+struct Seen {
+    @location(0) surface: vec4u,
+    @location(1) colour: vec4u,  // the bits of linear RGB
+}
+
+@vertex
+fn corner(
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) object: u32,
+    @location(3) uv: vec2f,
+    @location(4) density: f32,
+) -> Corner {
+    return Corner(clip_from_world(position), position, normal, object, uv, density);
+}
+
+@fragment
+fn surface(in: Corner) -> Seen {
+    let direction = pixel_ray(vec2u(in.clip.xy));
+    let slope = dot(in.normal, direction);
+    let front = slope < 0.0;
+    let distance = plane_distance(in.anchor, in.normal, direction);
+    let layout = layouts[in.object];
+    var colour = vec3f(1.0);
+    if layout.levels > 0u {
+        if texture_bilinear(layout, in.uv, 0u).w < layout.cutoff {
+            discard;
+        }
+        let pixel = 2.0 * frame.camera.tan_half_fov / f32(frame.size.y);
+        let width = texture_footprint(pixel, distance, abs(slope));
+        colour = texture_sample(layout, in.uv, texture_level_of_width(in.density, width)).rgb;
+    }
+    let word = surface_pack(distance, select(-in.normal, in.normal, front), in.object, front);
+    return Seen(word, vec4u(bitcast<vec3u>(colour), 0u));
+}

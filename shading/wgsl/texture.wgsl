@@ -1,0 +1,88 @@
+// Turns texture coordinates into a colour: twin of texture.rs. The module that includes it has `texels: array<vec2u>`.
+
+struct TextureLayout {
+    first: u32,
+    width: u32,
+    height: u32,
+    levels: u32,
+    wrap_u: u32,
+    wrap_v: u32,
+    cutoff: f32,             // alpha below it is a hole
+    pad_0: u32,
+}
+
+struct TextureLevel {
+    first: u32,
+    width: u32,
+    height: u32,
+}
+
+fn texture_level(layout: TextureLayout, index: u32) -> TextureLevel {
+    let last = min(index, layout.levels - 1u);
+    var first = layout.first;
+    for (var i = 0u; i < last; i++) {
+        first += max(layout.width >> i, 1u) * max(layout.height >> i, 1u);
+    }
+    return TextureLevel(first, max(layout.width >> last, 1u), max(layout.height >> last, 1u));
+}
+
+fn texture_level_of_width(density: f32, width_m: f32) -> f32 {
+    return log2(min(max(density * width_m, 1.0), F32_MAX));
+}
+
+fn texture_footprint(pixel: f32, distance: f32, cos_theta: f32) -> f32 {
+    return pixel * distance / sqrt(max(cos_theta, 0.01));
+}
+
+fn texture_sample(layout: TextureLayout, uv: vec2f, level: f32) -> vec4f {
+    let whole = floor(level);
+    let fraction = level - whole;
+    let fine = texture_bilinear(layout, uv, u32(whole));
+    if fraction <= 0.0 {
+        return fine;
+    }
+    return fine + (texture_bilinear(layout, uv, u32(whole) + 1u) - fine) * fraction;
+}
+
+fn texture_bilinear(layout: TextureLayout, uv: vec2f, index: u32) -> vec4f {
+    let level = texture_level(layout, index);
+    let size = vec2f(f32(level.width), f32(level.height));
+    let place = vec2f(texture_wrapped(uv.x, layout.wrap_u), texture_wrapped(uv.y, layout.wrap_v)) * size - 0.5;
+    let low = floor(place);
+    let fraction = place - low;
+    let column = i32(low.x);
+    let row = i32(low.y);
+    let left = texture_neighbour(column, i32(level.width), layout.wrap_u);
+    let right = texture_neighbour(column + 1, i32(level.width), layout.wrap_u);
+    let top = level.first + texture_neighbour(row, i32(level.height), layout.wrap_v) * level.width;
+    let bottom = level.first + texture_neighbour(row + 1, i32(level.height), layout.wrap_v) * level.width;
+    let upper = texture_unpack(texels[top + left]) * (1.0 - fraction.x) + texture_unpack(texels[top + right]) * fraction.x;
+    let lower = texture_unpack(texels[bottom + left]) * (1.0 - fraction.x) + texture_unpack(texels[bottom + right]) * fraction.x;
+    return upper * (1.0 - fraction.y) + lower * fraction.y;
+}
+
+fn texture_wrapped(u: f32, wrap: u32) -> f32 {
+    if wrap == TEXTURE_REPEAT {
+        return u - floor(u);
+    }
+    if wrap == TEXTURE_MIRROR {
+        return 1.0 - abs(u - floor(u * 0.5) * 2.0 - 1.0);
+    }
+    return clamp(u, 0.0, 1.0);
+}
+
+fn texture_neighbour(index: i32, count: i32, wrap: u32) -> u32 {
+    if wrap == TEXTURE_REPEAT {
+        if index < 0 {
+            return u32(count - 1);
+        }
+        if index >= count {
+            return 0u;
+        }
+    }
+    return u32(clamp(index, 0, count - 1));
+}
+
+fn texture_unpack(texel: vec2u) -> vec4f {
+    return vec4f(unpack2x16unorm(texel.x), unpack2x16unorm(texel.y));
+}
