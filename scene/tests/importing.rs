@@ -256,6 +256,28 @@ fn texture_coordinates_and_normals_change_no_mesh_without_a_texture() {
     }
 }
 
+/// A pair counts before a material, that before a group; what is not there is an error.
+#[test]
+fn materials_are_replaced_by_name() {
+    let files = Files::new(OBJ, MTL);
+    let scene = files.scene("", ", materials = { white = \"grey\" }");
+    let albedo = |scene: &Scene, name: &str| scene.albedo(scene.object(name).unwrap());
+    assert_eq!(albedo(&scene, "it/floor/white"), Vec3::splat(0.3));
+    assert_eq!(albedo(&scene, "it/odd/white"), Vec3::splat(0.3));
+    assert_eq!(albedo(&scene, "it/odd/lamp"), Vec3::splat(0.2));
+    // An emitter stays one.
+    let scene = files.scene("", ", materials = { odd = \"grey\", \"floor/white\" = \"grey\" }");
+    assert_eq!(albedo(&scene, "it/odd/lamp"), Vec3::splat(0.3));
+    assert!(scene.light("it/odd/lamp/0").is_some());
+    assert_eq!(albedo(&scene, "it/ceiling/lamp"), Vec3::splat(0.2));
+    let again = Scene::from_resolved(&scene.resolved_text).unwrap();
+    assert_eq!((&again.materials, again.hash), (&scene.materials, scene.hash));
+    for (keys, expected) in [("wihte = \"grey\"", "white"), ("white = \"gray\"", "grey")] {
+        let error = files.build("", &format!(", materials = {{ {keys} }}")).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("materials"), "{error}");
+    }
+}
+
 /// Clear panes are not there for light, nor for the eye.
 #[test]
 fn light_passes_what_transmits() {

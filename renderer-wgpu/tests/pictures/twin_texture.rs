@@ -19,8 +19,8 @@ fn texture_lookups() {
     let body = "for (var i = 0u; i < 18u; i++) {
             texels[i] = vec2u(i * 0x9E3779B9u, (i * 0x85EBCA6Bu) ^ 0x12345678u);
         }
-        let layout = TextureLayout(0u, 5u, 3u, 3u, u32(x[3] * 3.0), u32(x[4] * 3.0), 0.0, 0u);
-        let seen = texture_sample(layout, vec2f(x[0], x[1]) * 4.0 - 2.0, x[2]);
+        let place = TextureLayout(0u, 5u, 3u, 3u, u32(x[3] * 3.0), u32(x[4] * 3.0), 0.0, 0u);
+        let seen = texture_sample(place, vec2f(x[0], x[1]) * 4.0 - 2.0, x[2]);
         y = array<f32, 4>(seen.x, seen.y, seen.z, seen.w);";
     let texels: Vec<_> = (0..18).map(texel).collect();
     let wrap = |x: f32| [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][(x * 3.0) as usize];

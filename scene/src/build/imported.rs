@@ -14,7 +14,7 @@ use crate::{
 };
 use glam::DVec3;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -38,13 +38,14 @@ struct Table<'c, 'a> {
     path: &'c str,
     exclude: &'c [String],
     transmit: &'c [String],
+    materials: Option<&'c BTreeMap<String, String>>,
     frame: Frame,
     field: Field<'a>,
     load: fn(&Path, Frame, &[String]) -> Loaded,
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
-    if let Some(ObjConfig { path, up_axis, unit_m, exclude, transmit }) = &mut object.obj {
+    if let Some(ObjConfig { path, up_axis, unit_m, exclude, transmit, materials }) = &mut object.obj {
         let field = field.key("obj");
         let frame = Frame::resolve(up_axis, unit_m, &field)?;
         let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
@@ -52,17 +53,19 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
             path,
             exclude,
             transmit,
+            materials: materials.as_ref(),
             frame,
             field,
             load: |path, frame, _| load_obj(path, frame),
         });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, exclude, transmit } = gltf;
+    let GltfConfig { path, up_axis, unit_m, exclude, transmit, materials } = gltf;
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
     let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
-    Ok(Table { path, exclude, transmit, frame, field, load: load_gltf })
+    let materials = materials.as_ref();
+    Ok(Table { path, exclude, transmit, materials, frame, field, load: load_gltf })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -94,7 +97,7 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, transmit, frame, field, load } = table(object, context.field)?;
+    let Table { path, exclude, transmit, materials, frame, field, load } = table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
     let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
@@ -110,6 +113,7 @@ pub(super) fn read(
     let mut excluded = named(&import, exclude, &field.key("exclude"))?;
     // What lets all light pass straight through is not there for it.
     excluded.extend(named(&import, transmit, &field.key("transmit"))?);
+    let replaced = replaced(&import, materials, &field.key("materials"), context.materials)?;
     context.inputs.files.extend(import.files.iter().cloned());
     context.inputs.contents.insert(name.to_owned(), (absolute, import.content));
     let of_materials = if overriding.is_none() { import.material_notices.as_slice() } else { &[] };
@@ -123,11 +127,16 @@ pub(super) fn read(
             continue;
         }
         let imported = import.materials.get(&material);
+        let overriding = replaced.get(&format!("{group}/{material}")).or(overriding.as_ref());
         let surface =
             surface(name, &material, imported, (import.terms, overriding.is_some()), context.notices)
                 .map_err(|problem| asset_error(file.clone(), problem, "repair the material"))?;
-        let source =
-            Source { name, group: &group, material: &material, override_material: overriding.as_deref() };
+        let source = Source {
+            name,
+            group: &group,
+            material: &material,
+            override_material: overriding.map(String::as_str),
+        };
         parts.push(part(source, content, surface, (sides, placement), context));
     }
     if parts.is_empty() {
@@ -277,6 +286,28 @@ fn surface(
         surface.albedo = surface.albedo.min(DVec3::ONE);
     }
     Ok(surface)
+}
+
+/// The material of the scene file for each `group/material` pair that has one in the file's place: that of the pair, else
+/// of the material, else of the group.
+fn replaced(
+    import: &Import,
+    materials: Option<&BTreeMap<String, String>>,
+    field: &Field<'_>,
+    known: &Materials,
+) -> Result<BTreeMap<String, String>, SceneError> {
+    let mut replaced = BTreeMap::new();
+    let Some(materials) = materials else { return Ok(replaced) };
+    for (name, material) in materials {
+        known.check(material, &field.key(name))?;
+        named(import, std::slice::from_ref(name), field)?;
+    }
+    for (group, material) in import.groups.keys() {
+        let pair = format!("{group}/{material}");
+        let own = [&pair, material, group].into_iter().find_map(|name| materials.get(name));
+        replaced.extend(own.map(|own| (pair, own.clone())));
+    }
+    Ok(replaced)
 }
 
 /// The `group/material` pairs that `names` name.

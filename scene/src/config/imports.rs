@@ -2,6 +2,7 @@
 
 use super::{ObjectConfig, values};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Which axis of a file points up. The scene's is +Y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct ObjConfig {
     /// Groups, materials or `group/material` pairs of clear panes: light passes straight through, and nothing is seen of
     /// them.
     pub transmit: Option<Vec<String>>,
+    /// Materials of the scene file in the place of the file's, by group, material or `group/material` pair.
+    pub materials: Option<BTreeMap<String, String>>,
 }
 
 /// `ply`: the faces of a PLY file as one object.
@@ -61,6 +64,8 @@ pub struct GltfConfig {
     /// Nodes, materials or `node/material` pairs of clear panes: light passes straight through, and nothing is seen of
     /// them.
     pub transmit: Option<Vec<String>>,
+    /// Materials of the scene file in the place of the file's, by node, material or `node/material` pair.
+    pub materials: Option<BTreeMap<String, String>>,
 }
 
 impl ObjectConfig {

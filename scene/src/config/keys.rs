@@ -34,6 +34,7 @@ fn every_key() -> SceneConfig {
             unit_m: Some(1.0),
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
+            materials: Some([("NAME".into(), "m".into())].into()),
         }),
         ply: Some(PlyConfig { path: "p".into(), up_axis: Some(UpAxis::Z), unit_m: Some(1.0) }),
         gltf: Some(GltfConfig {
@@ -42,6 +43,7 @@ fn every_key() -> SceneConfig {
             unit_m: Some(1.0),
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
+            materials: Some([("NAME".into(), "m".into())].into()),
         }),
     };
     let light = LightConfig {
