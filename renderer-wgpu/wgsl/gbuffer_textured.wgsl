@@ -35,15 +35,15 @@ fn surface(in: Corner) -> Seen {
     let slope = dot(in.normal, direction);
     let front = slope < 0.0;
     let distance = plane_distance(in.anchor, in.normal, direction);
-    let place = layouts[in.object];
+    let picture = layouts[in.object];
     var colour = vec3f(1.0);
-    if place.levels > 0u {
-        if texture_bilinear(place, in.uv, 0u).w < place.cutoff {
+    if picture.levels > 0u {
+        if texture_bilinear(picture, in.uv, 0u).w < picture.cutoff {
             discard;
         }
         let pixel = 2.0 * frame.camera.tan_half_fov / f32(frame.size.y);
         let width = texture_footprint(pixel, distance, abs(slope));
-        colour = texture_sample(place, in.uv, texture_level_of_width(in.density, width)).rgb;
+        colour = texture_sample(picture, in.uv, texture_level_of_width(in.density, width)).rgb;
     }
     let word = surface_pack(distance, select(-in.normal, in.normal, front), in.object, front);
     return Seen(word, vec4u(bitcast<vec3u>(colour), 0u));

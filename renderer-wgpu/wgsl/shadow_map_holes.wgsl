@@ -25,8 +25,8 @@ fn corner(@location(0) position: vec3f, @location(2) object: u32, @location(3) u
 
 @fragment
 fn holes(in: Corner) {
-    let place = layouts[in.object];
-    if place.levels > 0u && texture_bilinear(place, in.uv, 0u).w < place.cutoff {
+    let picture = layouts[in.object];
+    if picture.levels > 0u && texture_bilinear(picture, in.uv, 0u).w < picture.cutoff {
         discard;
     }
 }

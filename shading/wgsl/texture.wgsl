@@ -17,13 +17,13 @@ struct TextureLevel {
     height: u32,
 }
 
-fn texture_level(place: TextureLayout, index: u32) -> TextureLevel {
-    let last = min(index, place.levels - 1u);
-    var first = place.first;
+fn texture_level(picture: TextureLayout, index: u32) -> TextureLevel {
+    let last = min(index, picture.levels - 1u);
+    var first = picture.first;
     for (var i = 0u; i < last; i++) {
-        first += max(place.width >> i, 1u) * max(place.height >> i, 1u);
+        first += max(picture.width >> i, 1u) * max(picture.height >> i, 1u);
     }
-    return TextureLevel(first, max(place.width >> last, 1u), max(place.height >> last, 1u));
+    return TextureLevel(first, max(picture.width >> last, 1u), max(picture.height >> last, 1u));
 }
 
 fn texture_level_of_width(density: f32, width_m: f32) -> f32 {
@@ -34,28 +34,28 @@ fn texture_footprint(pixel: f32, distance: f32, cos_theta: f32) -> f32 {
     return pixel * distance / sqrt(max(cos_theta, 0.01));
 }
 
-fn texture_sample(place: TextureLayout, uv: vec2f, level: f32) -> vec4f {
+fn texture_sample(picture: TextureLayout, uv: vec2f, level: f32) -> vec4f {
     let whole = floor(level);
     let fraction = level - whole;
-    let fine = texture_bilinear(place, uv, u32(whole));
+    let fine = texture_bilinear(picture, uv, u32(whole));
     if fraction <= 0.0 {
         return fine;
     }
-    return fine + (texture_bilinear(place, uv, u32(whole) + 1u) - fine) * fraction;
+    return fine + (texture_bilinear(picture, uv, u32(whole) + 1u) - fine) * fraction;
 }
 
-fn texture_bilinear(place: TextureLayout, uv: vec2f, index: u32) -> vec4f {
-    let level = texture_level(place, index);
+fn texture_bilinear(picture: TextureLayout, uv: vec2f, index: u32) -> vec4f {
+    let level = texture_level(picture, index);
     let size = vec2f(f32(level.width), f32(level.height));
-    let place = vec2f(texture_wrapped(uv.x, place.wrap_u), texture_wrapped(uv.y, place.wrap_v)) * size - 0.5;
+    let place = vec2f(texture_wrapped(uv.x, picture.wrap_u), texture_wrapped(uv.y, picture.wrap_v)) * size - 0.5;
     let low = floor(place);
     let fraction = place - low;
     let column = i32(low.x);
     let row = i32(low.y);
-    let left = texture_neighbour(column, i32(level.width), place.wrap_u);
-    let right = texture_neighbour(column + 1, i32(level.width), place.wrap_u);
-    let top = level.first + texture_neighbour(row, i32(level.height), place.wrap_v) * level.width;
-    let bottom = level.first + texture_neighbour(row + 1, i32(level.height), place.wrap_v) * level.width;
+    let left = texture_neighbour(column, i32(level.width), picture.wrap_u);
+    let right = texture_neighbour(column + 1, i32(level.width), picture.wrap_u);
+    let top = level.first + texture_neighbour(row, i32(level.height), picture.wrap_v) * level.width;
+    let bottom = level.first + texture_neighbour(row + 1, i32(level.height), picture.wrap_v) * level.width;
     let upper = texture_unpack(texels[top + left]) * (1.0 - fraction.x) + texture_unpack(texels[top + right]) * fraction.x;
     let lower = texture_unpack(texels[bottom + left]) * (1.0 - fraction.x) + texture_unpack(texels[bottom + right]) * fraction.x;
     return upper * (1.0 - fraction.y) + lower * fraction.y;
