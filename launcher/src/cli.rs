@@ -24,6 +24,7 @@ pub(crate) const AFTER_HELP: &str = "\
 Examples:
   photonstream                                       the built-in scene in a window, or a picture in out/
   photonstream render room.toml --out room.png       a picture of a scene
+  photonstream run model.glb                         a model without a scene file: glTF, OBJ or PLY
   photonstream run room.toml --frames 20 --out film  pictures while the light settles
   photonstream check room.toml                       is the scene valid, and what will be modelled?
 
@@ -79,6 +80,8 @@ pub(crate) enum Command {
     Record(record::Args),
     /// Publish the frames of a recording again
     Replay(replay::Args),
+    /// Write the scene file that a model without one is shown with, to be edited
+    Config(config::Args),
     /// Validate a scene and say what will be modelled, and why
     Check(check::Args),
     /// List what is running, and what a crash left

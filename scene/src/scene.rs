@@ -63,6 +63,8 @@ pub struct Scene {
     pub features: Features,
     /// What was repaired or left out while loading, one sentence each.
     pub notices: Vec<String>,
+    /// What was chosen for a model without a scene file, one sentence each.
+    pub choices: Vec<String>,
     /// What moves and dims lights and objects; as loaded, the scene is what it is at time 0.
     pub animation: Arc<Animation>,
     /// Files that the scene was read from, beside its config.

@@ -15,7 +15,7 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 /// Arguments of `photonstream simulate` and `photonstream-simulator`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// Scene to simulate: a TOML file
+    /// Scene to simulate: a TOML file, or a model (glTF, OBJ, PLY)
     pub config: PathBuf,
     /// Channel to publish on
     #[arg(long, default_value_t)]
@@ -149,6 +149,9 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
     let begun = Instant::now();
     let mut source = ConfigSource::new(&args.config, args.overrides.clone());
     let scene = source.load()?;
+    for choice in &scene.choices {
+        tracing::info!("{}: chosen {choice}", scene.name);
+    }
     for notice in &scene.notices {
         tracing::warn!("{}: {notice}", scene.name);
     }

@@ -13,10 +13,10 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 JSON: { \"scene\", \"scene_hash\", \"objects\", \"triangles\", \"materials\", \"lights\", \"vsls\", \"pool_paths\", \"width_px\",
-  \"height_px\", \"kernel\", \"visibility\", \"origin_m\": [x, y, z], \"extent_m\": [x, y, z], \"notices\": [texts],
+  \"height_px\", \"kernel\", \"visibility\", \"origin_m\": [x, y, z], \"extent_m\": [x, y, z], \"choices\": [texts], \"notices\": [texts],
   \"decisions\": [ { \"what\", \"modelled\", \"reason\" } ] }")]
 pub(crate) struct Args {
-    /// Scene file
+    /// Scene file or model
     pub(crate) config: PathBuf,
 }
 
@@ -36,6 +36,7 @@ struct Report {
     visibility: &'static str,
     origin_m: [f64; 3],
     extent_m: [f32; 3],
+    choices: Vec<String>,
     notices: Vec<String>,
     decisions: Vec<Feature>,
 }
@@ -83,6 +84,7 @@ fn report(scene: &Scene) -> Report {
         visibility: scene.render.visibility.name(),
         origin_m: scene.origin_m.to_array(),
         extent_m: (hi - lo).to_array(),
+        choices: scene.choices.clone(),
         notices: scene.notices.clone(),
         decisions: scene.features.decisions().into_iter().map(Feature::from).collect(),
     }
@@ -105,6 +107,7 @@ fn text(report: &Report) -> String {
     );
     out.push_str("modelled:\n");
     out.extend(report.decisions.iter().map(Feature::line));
+    out.extend(report.choices.iter().map(|choice| format!("chosen: {choice}\n")));
     out.extend(report.notices.iter().map(|notice| format!("notice: {notice}\n")));
     out
 }

@@ -5,6 +5,7 @@ pub(crate) mod channels;
 pub(crate) mod check;
 pub(crate) mod clean;
 pub(crate) mod compare;
+pub(crate) mod config;
 pub(crate) mod default_run;
 pub(crate) mod evaluate;
 pub(crate) mod export;
@@ -46,6 +47,7 @@ pub(crate) fn dispatch(program: Program) -> Result<(), LauncherError> {
         Some(Command::Record(args)) => record::run(&args, global),
         Some(Command::Replay(args)) => replay::run(&args, global),
         Some(Command::Set(args)) => set::run(&args, global),
+        Some(Command::Config(args)) => config::run(&args, global),
         Some(Command::Check(args)) => check::run(&args, global),
         Some(Command::Channels(args)) => channels::run(&args, global),
         Some(Command::Clean(args)) => clean::run(&args, global),

@@ -130,6 +130,7 @@ impl SceneConfig {
             bounds,
             features,
             notices,
+            choices: std::mem::take(&mut self.chosen),
             animation: Arc::new(animation),
             files: inputs.files.into(),
             rest_meshes: rest_meshes.into(),

@@ -5,11 +5,14 @@ use crate::error::{SceneError, nearest};
 use std::{fs, path::Path};
 
 impl SceneConfig {
-    /// Reads a scene file.
+    /// Reads a scene file, or chooses a scene for a model ([`crate::ModelScene`]).
     ///
     /// # Errors
-    /// If the file cannot be read, is not TOML, or has a key or type that no scene file has.
+    /// If the file cannot be read, is not TOML, or has a key or type that no scene file has; or is no valid model.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
+        if crate::is_model(path) {
+            return crate::model::config(path);
+        }
         let text =
             fs::read_to_string(path).map_err(|source| SceneError::Read { file: path.to_owned(), source })?;
         Self::from_text(&text, path)
@@ -29,6 +32,14 @@ impl SceneConfig {
             Ok(config) => Ok(Self { document, ..config }),
             Err(error) => Err(translate(&document, &error)),
         }
+    }
+}
+
+impl SceneConfig {
+    /// The same without the text it was read from: errors name no lines of it. `chosen` is what [`crate::Scene::choices`] tells.
+    pub(crate) fn without_text(mut self, chosen: Vec<String>) -> Self {
+        self.document.text.clear();
+        Self { chosen, ..self }
     }
 }
 

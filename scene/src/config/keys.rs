@@ -112,6 +112,7 @@ fn every_key() -> SceneConfig {
             tone_map: Some(ToneMap::Linear),
         },
         document: Document::default(),
+        chosen: Vec::new(),
     }
 }
 

@@ -53,6 +53,9 @@ pub struct SceneConfig {
     pub render: RenderConfig,
     #[serde(skip)]
     pub(crate) document: Document,
+    /// What was chosen for a model that has no scene file, one sentence each.
+    #[serde(skip)]
+    pub(crate) chosen: Vec<String>,
 }
 
 /// `[camera]`: a pinhole camera.

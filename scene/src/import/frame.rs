@@ -28,6 +28,11 @@ impl Frame {
         Ok(Self { up, unit_m })
     }
 
+    /// With `up` pointing up, and so many metres in a unit.
+    pub(crate) fn new(up: UpAxis, unit_m: f64) -> Self {
+        Self { up, unit_m }
+    }
+
     /// A point of the file, m.
     pub(crate) fn apply(&self, point: DVec3) -> DVec3 {
         self.turn(point) * self.unit_m

@@ -13,7 +13,7 @@ mod texture;
 pub use assets::AssetRoots;
 pub(crate) use beside::read as read_file;
 pub(crate) use frame::Frame;
-pub(crate) use gltf::load_gltf;
+pub(crate) use gltf::{FileCamera, gltf_cameras, load_gltf};
 pub(crate) use obj::{NO_MATERIAL, load_obj};
 pub(crate) use ply::read_ply;
 

@@ -1,11 +1,15 @@
 //! Turns a config file and the settings that override it into scenes, as often as the file changes.
 
 use crate::cli::Overrides;
-use photonstream_scene::{Scene, SceneConfig, SceneError};
+use photonstream_scene::{Scene, SceneConfig, SceneError, is_model};
 use std::{
+    io,
     path::{Path, PathBuf},
     time::SystemTime,
 };
+
+/// The text of a model, which has none: the scene is made anew when the file changes.
+const MODEL: &str = "model";
 
 /// Where the scene of a simulation comes from.
 #[derive(Clone, Debug)]
@@ -21,7 +25,7 @@ pub struct ConfigSource {
 }
 
 impl ConfigSource {
-    /// The config at `path`.
+    /// The config at `path`, or that of the model there.
     pub fn new(path: impl Into<PathBuf>, overrides: Overrides) -> Self {
         Self { path: path.into(), overrides, text: None, since: SystemTime::UNIX_EPOCH }
     }
@@ -32,8 +36,7 @@ impl ConfigSource {
     /// If it cannot be read, or is not valid.
     pub fn load(&mut self) -> Result<Scene, SceneError> {
         self.since = SystemTime::now();
-        let text = std::fs::read_to_string(&self.path)
-            .map_err(|source| SceneError::Read { file: self.path.clone(), source })?;
+        let text = self.read().map_err(|source| SceneError::Read { file: self.path.clone(), source })?;
         let scene = self.load_text(&text)?;
         self.text = Some(text);
         Ok(scene)
@@ -49,15 +52,26 @@ impl ConfigSource {
         self.since
     }
 
-    /// The scene that `text` would be in the place of the file.
+    /// The text of the file; of a model, whose own content is an asset, what stands for it.
+    pub(super) fn read(&self) -> io::Result<String> {
+        if is_model(&self.path) {
+            std::fs::metadata(&self.path)?;
+            return Ok(MODEL.into());
+        }
+        let bytes = std::fs::read(&self.path)?;
+        String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+    }
+
+    /// The scene that `text` would be in the place of the file; that of a model as it is now.
     ///
     /// # Errors
     /// If it is not valid.
-    pub fn load_text(&self, text: &str) -> Result<Scene, SceneError> {
-        self.finish(SceneConfig::from_text(text, &self.path)?)
-    }
-
-    fn finish(&self, config: SceneConfig) -> Result<Scene, SceneError> {
+    pub(super) fn load_text(&self, text: &str) -> Result<Scene, SceneError> {
+        let config = if is_model(&self.path) {
+            SceneConfig::from_file(&self.path)?
+        } else {
+            SceneConfig::from_text(text, &self.path)?
+        };
         self.overrides.apply(config)?.build()
     }
 

@@ -217,7 +217,7 @@ impl Watch {
 
     /// What there is to tell after a change.
     fn look(&mut self, assets_changed: bool, is_gone: bool) -> Option<News> {
-        let text = match read_twice(&self.source.path) {
+        let text = match read_twice(&self.source) {
             Ok(text) if text.trim().is_empty() => return None,
             Ok(text) => text,
             // It is being replaced, until it is gone for longer.
@@ -248,17 +248,12 @@ impl Watch {
     }
 }
 
-fn read(path: &Path) -> io::Result<String> {
-    let bytes = std::fs::read(path)?;
-    String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
-}
-
 /// Reads until two readings are equal, a few times.
-fn read_twice(path: &Path) -> io::Result<String> {
-    let mut last = read(path);
+fn read_twice(source: &ConfigSource) -> io::Result<String> {
+    let mut last = source.read();
     for _ in 0..20 {
         std::thread::sleep(BETWEEN);
-        let now = read(path);
+        let now = source.read();
         match (last, now) {
             (Ok(a), Ok(b)) if a == b => return Ok(b),
             (Err(_), Err(error)) => return Err(error),

@@ -11,6 +11,7 @@ mod harness;
 mod kills;
 mod main_job;
 mod messages;
+mod models;
 mod notices;
 mod plug_ins;
 mod replay;

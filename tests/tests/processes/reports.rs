@@ -2,7 +2,7 @@
 
 use crate::harness::{Ground, config, has_keys};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "run",
     "simulate",
     "render",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 13] = [
     "replay",
     "set",
     "check",
+    "config",
     "channels",
     "clean",
     "bench",
@@ -51,7 +52,7 @@ fn json_reports_have_their_documented_keys() {
         &check,
         &keys(
             "scene scene_hash objects triangles materials lights vsls pool_paths width_px height_px kernel visibility \
-             origin_m extent_m notices decisions",
+             origin_m extent_m choices notices decisions",
         ),
     );
     has_keys(&check["decisions"][0], &keys("what modelled reason"));
@@ -92,6 +93,24 @@ fn json_reports_have_their_documented_keys() {
 
     has_keys(&ground.json(&["channels", "--json"]), &keys("runtime_dir channels"));
     has_keys(&ground.json(&["clean", "--json"]), &keys("removed"));
+
+    let paper = ground.json(&["bench", "--paper", "--quick", "--cache", "cache", "--json"]);
+    has_keys(
+        &paper,
+        &keys("machine adapter without_adapter seconds error_size reference_spp scenes pictures skipped"),
+    );
+    assert_eq!(
+        (&paper["scenes"][0]["paper_polygons"], &paper["scenes"][0]["triangles"]),
+        (&2006.into(), &2006.into())
+    );
+    let picture = &paper["pictures"][0];
+    has_keys(
+        picture,
+        &keys(
+            "scene width height vsls paper_deferred_per_s paper_whole_per_s per_s rel_rmse_paper rel_rmse_octahedral",
+        ),
+    );
+    assert!(picture["per_s"][0][1].as_f64().unwrap() > 0.0, "{paper}");
 
     let simulation = ground.start(&[&["simulate", &scene, "--channel", "r", "--json"], &small[..]].concat());
     ground.segment("r");

@@ -2,6 +2,7 @@
 
 mod accessor;
 mod buffers;
+mod cameras;
 mod container;
 mod lights;
 mod materials;
@@ -15,6 +16,7 @@ use super::{
     beside::{self, Beside},
 };
 use accessor::Accessors;
+pub(crate) use cameras::{FileCamera, gltf_cameras};
 use container::Container;
 use glam::DVec3;
 use materials::Materials;

@@ -54,6 +54,10 @@ pub(super) fn check(root: &Root) -> Result<Vec<String>, String> {
             "morph targets are not read",
         ),
         (has_colours, "colours of vertices are not read"),
+        (
+            root.cameras.iter().any(|camera| camera.orthographic.is_some()),
+            "orthographic cameras are passed over",
+        ),
     ] {
         if is_there {
             notices.push(what.to_owned());
