@@ -48,6 +48,19 @@ pub trait Device {
         way: &Way,
         watch: Watch<'_>,
     ) -> Result<Drawn, RenderError>;
+
+    /// The times of some such frames alone, ms; of one where it takes long.
+    ///
+    /// # Errors
+    /// As [`Device::draw`].
+    fn time(
+        &mut self,
+        scene: &Scene,
+        frame: &VslFrame,
+        options: &RenderOptions,
+        way: &Way,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, RenderError>;
 }
 
 /// A device, or the reason why there is none.

@@ -36,6 +36,40 @@ impl GpuDevice {
         frame.epoch = self.epoch;
         self.renderer.set_frame(frame).map(drop)
     }
+
+    /// Times of frames, ms, at least `least`.
+    fn timed(
+        &mut self,
+        scene: &Scene,
+        frame: &VslFrame,
+        view: &View,
+        least: usize,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, RenderError> {
+        self.renderer.set_scene(scene)?;
+        let mut frame = frame.clone();
+        let mut frames_ms: Vec<f64> = Vec::new();
+        // The first makes pipelines, targets and shadow maps, and does not count.
+        for run in 0..=RUNS.0 {
+            watch.check()?;
+            if frames_ms.len() >= least && frames_ms.iter().sum::<f64>() > LONG_MS {
+                break;
+            }
+            let begun = Instant::now();
+            self.upload(&mut frame)?;
+            // Another place within the pixels: nothing of the last picture is still right.
+            let jitter = [0.5 + 1e-3 * (run + 1) as f32, 0.5];
+            let drawn = self.renderer.draw_watched(&View { jitter, ..*view }, watch)?;
+            if drawn.stopped {
+                return Err(RenderError::Cancelled);
+            }
+            self.renderer.gpu().wait()?;
+            if run > 0 {
+                frames_ms.push(begun.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+        Ok(frames_ms)
+    }
 }
 
 impl Device for GpuDevice {
@@ -69,51 +103,47 @@ impl Device for GpuDevice {
         way: &Way,
         watch: Watch<'_>,
     ) -> Result<Drawn, RenderError> {
-        let accumulation = Accumulation::ALL.iter().copied().find(|a| a.name() == way.accumulation);
-        let accumulation = accumulation.ok_or_else(|| RenderError::Option {
-            option: "accumulation",
-            found: way.accumulation.clone(),
-            expected: "tiled, splat or forward",
-        })?;
-        let view = View {
-            width: options.width,
-            height: options.height,
-            kernel: options.kernel,
-            visibility: options.visibility,
-            epsilon: options.epsilon,
-            light_samples: options.light_samples,
-            seed: options.seed,
-            accumulation,
-            interleave: way.interleave,
-            ..View::from_settings(&scene.render, &scene.camera)
-        };
-        self.renderer.set_scene(scene)?;
-        let mut frame = frame.clone();
-        let mut frames_ms: Vec<f64> = Vec::new();
-        // The first makes pipelines, targets and shadow maps, and does not count.
-        for run in 0..=RUNS.0 {
-            watch.check()?;
-            if frames_ms.len() >= RUNS.1 && frames_ms.iter().sum::<f64>() > LONG_MS {
-                break;
-            }
-            let begun = Instant::now();
-            self.upload(&mut frame)?;
-            // Another place within the pixels: nothing of the last picture is still right.
-            let jitter = [0.5 + 1e-3 * (run + 1) as f32, 0.5];
-            let drawn = self.renderer.draw_watched(&View { jitter, ..view }, watch)?;
-            if drawn.stopped {
-                return Err(RenderError::Cancelled);
-            }
-            self.renderer.gpu().wait()?;
-            if run > 0 {
-                frames_ms.push(begun.elapsed().as_secs_f64() * 1e3);
-            }
-        }
+        let view = view(scene, options, way)?;
+        let frames_ms = self.timed(scene, frame, &view, RUNS.1, watch)?;
         let layers: Vec<LayerKind> = options.layers.clone();
         let mut film = self.renderer.film(&View { show: Show::Layer(LayerKind::Full), ..view }, &layers)?;
         film.metadata.scene_hash = Some(scene.hash);
         Ok(Drawn { film, frames_ms })
     }
+
+    fn time(
+        &mut self,
+        scene: &Scene,
+        frame: &VslFrame,
+        options: &RenderOptions,
+        way: &Way,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, RenderError> {
+        let view = view(scene, options, way)?;
+        self.timed(scene, frame, &view, 1, watch)
+    }
+}
+
+/// What `options` and `way` ask for.
+fn view(scene: &Scene, options: &RenderOptions, way: &Way) -> Result<View, RenderError> {
+    let accumulation = Accumulation::ALL.iter().copied().find(|a| a.name() == way.accumulation);
+    let accumulation = accumulation.ok_or_else(|| RenderError::Option {
+        option: "accumulation",
+        found: way.accumulation.clone(),
+        expected: "tiled, splat or forward",
+    })?;
+    Ok(View {
+        width: options.width,
+        height: options.height,
+        kernel: options.kernel,
+        visibility: options.visibility,
+        epsilon: options.epsilon,
+        light_samples: options.light_samples,
+        seed: options.seed,
+        accumulation,
+        interleave: way.interleave,
+        ..View::from_settings(&scene.render, &scene.camera)
+    })
 }
 
 #[cfg(test)]

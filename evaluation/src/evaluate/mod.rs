@@ -56,7 +56,7 @@ pub struct Observer<'a> {
 }
 
 impl Observer<'_> {
-    fn watch(&self) -> Watch<'_> {
+    pub(crate) fn watch(&self) -> Watch<'_> {
         Watch { progress: None, cancelled: Some(self.cancelled) }
     }
 }

@@ -20,6 +20,31 @@ impl Bench {
         point: &Point,
         watch: Watch<'_>,
     ) -> Result<Shot, EvaluateError> {
+        let (frame, place_ms, light) = self.light_for(point)?;
+        watch.check()?;
+        let drawn = device.draw(&self.scene, &frame, &self.options(point), &way(point), watch)?;
+        let runs = drawn.frames_ms.len();
+        let times = Times { place_ms, light_ms: median(light), picture_ms: median(drawn.frames_ms) };
+        Ok(Shot { film: drawn.film, times, runs, vsls_placed: Some(frame.vsls.len()) })
+    }
+
+    /// The time of a picture of one point on `device`, ms: the median of several frames, or of one that takes long.
+    ///
+    /// # Errors
+    /// As [`Bench::shoot_on`].
+    pub fn time_on(
+        &mut self,
+        device: &mut dyn Device,
+        point: &Point,
+        watch: Watch<'_>,
+    ) -> Result<f64, EvaluateError> {
+        let (frame, ..) = self.light_for(point)?;
+        watch.check()?;
+        Ok(median(device.time(&self.scene, &frame, &self.options(point), &way(point), watch)?))
+    }
+
+    /// The light of a point, the time of placing it, and those of tracing it, ms.
+    fn light_for(&mut self, point: &Point) -> Result<(VslFrame, f64, Vec<f64>), EvaluateError> {
         let (simulation, place_ms) = self.placed_for(point);
         let pool = self.threads(point.threads)?;
         let mut light: Vec<f64> = Vec::new();
@@ -30,14 +55,12 @@ impl Bench {
                 break frame;
             }
         };
-        watch.check()?;
-        let way = Way { accumulation: point.accumulation.clone(), interleave: point.interleave };
-        let frame = VslFrame { scene_hash: self.scene.hash, ..frame };
-        let drawn = device.draw(&self.scene, &frame, &self.options(point), &way, watch)?;
-        let runs = drawn.frames_ms.len();
-        let times = Times { place_ms, light_ms: median(light), picture_ms: median(drawn.frames_ms) };
-        Ok(Shot { film: drawn.film, times, runs, vsls_placed: Some(frame.vsls.len()) })
+        Ok((VslFrame { scene_hash: self.scene.hash, ..frame }, place_ms, light))
     }
+}
+
+fn way(point: &Point) -> Way {
+    Way { accumulation: point.accumulation.clone(), interleave: point.interleave }
 }
 
 /// The middle one; of an even number the slower of both.

@@ -51,6 +51,13 @@ pub(crate) struct Args {
     /// Folder where references are kept [default: the user's cache folder, else DIR/cache]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
+    #[command(flatten)]
+    adapter: Adapter,
+}
+
+/// Which graphics adapter is measured; none in a build without the GPU renderer.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct Adapter {
     /// Measure the GPU renderer on the adapter whose name contains this [default: the most capable one]
     #[cfg(feature = "wgpu")]
     #[arg(long, value_name = "NAME")]
@@ -94,16 +101,8 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
         bar.set(share);
         bar.say(what.to_owned());
     };
-    #[cfg(feature = "wgpu")]
-    let mut device = gpu(args)?;
-    #[cfg(feature = "wgpu")]
-    let device: Offered<'_> = match &mut device {
-        Ok(device) => Ok(device),
-        Err(reason) => Err(reason.clone()),
-    };
-    #[cfg(not(feature = "wgpu"))]
-    let device: Offered<'_> = Err("this build has no GPU renderer: its feature wgpu is off".into());
-    let measured = evaluate(&options, device, Observer { progress: &progress, cancelled: &cancelled });
+    let observer = Observer { progress: &progress, cancelled: &cancelled };
+    let measured = args.adapter.with_device(|device| Ok(evaluate(&options, device, observer)?));
     drop(bar);
     let page = args.out.join("index.html");
     let results = measured.inspect_err(|_| {
@@ -127,22 +126,40 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     output::report(global.json, &report, text)
 }
 
-/// The GPU renderer, or why there is none.
-///
-/// # Errors
-/// An adapter that was asked for by name and is not there.
-#[cfg(feature = "wgpu")]
-fn gpu(args: &Args) -> Result<Result<GpuDevice, String>, LauncherError> {
-    let (name, software) = (args.adapter.clone(), args.software);
-    let was_asked_for = name.is_some() || software;
-    match GpuDevice::new(photonstream_renderer_wgpu::AdapterChoice { name, software }) {
-        Err(error) if was_asked_for => Err(photonstream_renderer::RenderError::from(error).into()),
-        other => Ok(other.map_err(|error| error.to_string())),
+impl Adapter {
+    /// What `measure` makes with the GPU renderer, or with the reason why there is none.
+    ///
+    /// # Errors
+    /// An adapter that was asked for and is not there; those of `measure`.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn with_device<T>(
+        &self,
+        measure: impl FnOnce(Offered<'_>) -> Result<T, LauncherError>,
+    ) -> Result<T, LauncherError> {
+        let (name, software) = (self.adapter.clone(), self.software);
+        let was_asked_for = name.is_some() || software;
+        match GpuDevice::new(photonstream_renderer_wgpu::AdapterChoice { name, software }) {
+            Ok(mut device) => measure(Ok(&mut device)),
+            Err(error) if was_asked_for => Err(photonstream_renderer::RenderError::from(error).into()),
+            Err(error) => measure(Err(error.to_string())),
+        }
+    }
+
+    /// What `measure` makes without a GPU renderer.
+    ///
+    /// # Errors
+    /// Those of `measure`.
+    #[cfg(not(feature = "wgpu"))]
+    pub(crate) fn with_device<T>(
+        &self,
+        measure: impl FnOnce(Offered<'_>) -> Result<T, LauncherError>,
+    ) -> Result<T, LauncherError> {
+        measure(Err("this build has no GPU renderer: its feature wgpu is off".into()))
     }
 }
 
 /// `$XDG_CACHE_HOME/photonstream`, else `~/.cache/photonstream`.
-fn user_cache() -> Option<PathBuf> {
+pub(crate) fn user_cache() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let base = folder("XDG_CACHE_HOME").or_else(|| folder("HOME").map(|home| home.join(".cache")))?;
     base.is_absolute().then(|| base.join("photonstream"))
