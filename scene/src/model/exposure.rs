@@ -3,6 +3,7 @@
 use crate::{
     bvh::Ray,
     scene::{Scene, Side},
+    texturing::Detail,
 };
 use glam::Vec3;
 use photonstream_shading::{
@@ -70,7 +71,7 @@ fn radiance(scene: &Scene, mut origin: Vec3, mut direction: Vec3, sample: &mut S
         let vertices = scene.geometry.triangle(hit.triangle);
         let normal = front * side.sign();
         origin = surface::offset(vertices, surface::point(vertices, hit.u, hit.v), normal);
-        beta *= scene.albedo(object);
+        beta *= scene.albedo_at(hit.triangle, [hit.u, hit.v], Detail::Transport);
         sum += beta * FRAC_1_PI * irradiance(scene, origin, normal, sample);
         direction = sampling::cosine_hemisphere(normal, sample.next_2d());
     }
