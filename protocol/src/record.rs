@@ -150,11 +150,11 @@ record! {
 record! {
     /// A light source, for direct light in the renderer.
     LightRecord, 128 {
-        /// 0 point, 1 spot, 2 directional, 3 parallelogram, 4 triangle.
+        /// 0 point, 1 spot, 2 directional, 3 parallelogram, 4 triangle, 5 sky.
         kind: u32,
         /// 1 while switched on, else 0.
         enabled: u32,
-        /// Linear RGB power in W; irradiance in W/m² for a directional light.
+        /// Linear RGB power in W; irradiance in W/m² for a directional light, mean radiance in W/(m² sr) for a sky.
         power: [f32; 3],
         /// Position in metres (a corner for area lights), relative to the scene origin.
         position: [f32; 3],

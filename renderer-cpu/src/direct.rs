@@ -17,7 +17,9 @@ pub(crate) fn irradiance(
     rays: &mut u64,
 ) -> Vec3 {
     // Where the surface is, not where its rays start: a lamp may be nearer than a few times the way between.
-    let Some(Illumination { wi, distance, irradiance }) = light.shape.illuminate(surface.position, u) else {
+    let Some(Illumination { wi, distance, irradiance }) =
+        light.shape.illuminate_surface(surface.position, surface.normal, u)
+    else {
         return Vec3::ZERO;
     };
     let cos_theta = surface.normal.dot(wi);
@@ -34,7 +36,7 @@ pub(crate) fn irradiance(
     if scene.bvh.occluded(&ray) { Vec3::ZERO } else { light.power * (irradiance * cos_theta) }
 }
 
-/// Irradiance in W m⁻² from all lights, area lights by `light_samples` stratified points each.
+/// Irradiance in W m⁻² from all lights, area lights and skies by `light_samples` stratified points or directions each.
 pub(crate) fn irradiance_of_all(
     scene: &Scene,
     surface: &Surface,

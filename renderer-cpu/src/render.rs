@@ -188,10 +188,13 @@ impl<'a> Frame<'a> {
                 self.gather(tile, first_lot, selection, &mut result);
             }
             for i in 0..count {
+                let (px, py) = pixel_of(i);
                 if let Some(surface) = &tile.surfaces[i] {
-                    let (px, py) = pixel_of(i);
                     let pixel = py * self.options.width + px;
                     self.shade(surface, tile.irradiance.get(i), pixel, sample_index, i, &mut result);
+                } else if self.scene.sky.is_some() {
+                    let background = self.scene.background(self.direction((px, py), sample_index));
+                    self.add_background(background, i, &mut result);
                 }
             }
         }
@@ -203,7 +206,14 @@ impl<'a> Frame<'a> {
     }
 
     /// What camera sample `sample_index` of a pixel sees.
-    fn see(&self, (px, py): (u32, u32), sample_index: u32) -> Option<Surface> {
+    fn see(&self, pixel: (u32, u32), sample_index: u32) -> Option<Surface> {
+        let camera = &self.scene.camera;
+        let width = camera.pixel_width(self.options.height);
+        surface::first(self.scene, camera.position, self.direction(pixel, sample_index), width)
+    }
+
+    /// Where camera sample `sample_index` of a pixel looks.
+    fn direction(&self, (px, py): (u32, u32), sample_index: u32) -> Vec3 {
         let options = self.options;
         let [u, v] = if options.samples_per_pixel == 1 {
             [0.5, 0.5]
@@ -211,10 +221,16 @@ impl<'a> Frame<'a> {
             let stream = py * options.width + px;
             Sequence::new(options.seed, stream).sample(sample_index.into()).next_2d()
         };
-        let camera = &self.scene.camera;
-        let direction = camera.direction(px as f32 + u, py as f32 + v, options.width, options.height);
-        let pixel = camera.pixel_width(options.height);
-        surface::first(self.scene, camera.position, direction, pixel)
+        self.scene.camera.direction(px as f32 + u, py as f32 + v, options.width, options.height)
+    }
+
+    /// Adds what lies behind all surfaces to the layers that show emitted light.
+    fn add_background(&self, background: Vec3, i: usize, result: &mut TileResult) {
+        for (layer, kind) in result.layers.iter_mut().zip(&self.options.layers) {
+            if kind.needs_direct() {
+                layer[i] += background;
+            }
+        }
     }
 
     fn gather(&self, tile: &mut Tile, first_lot: u32, selection: &mut Selection, result: &mut TileResult) {

@@ -8,6 +8,7 @@ use crate::{
     scope::Scope,
     shader,
     shadow_maps::ShadowMaps,
+    sky::SkyOnDevice,
     targets::{DEPTH, GBUFFER, HDR, Target, Targets},
     textures::Textures,
 };
@@ -20,6 +21,7 @@ use wgpu::TextureUsages;
 pub(crate) struct DirectKind {
     pub(crate) delta_lights: bool,
     pub(crate) area_lights: bool,
+    pub(crate) sky: bool,
     pub(crate) shadows: bool,
     /// Whether maps name triangles.
     pub(crate) named: bool,
@@ -28,7 +30,7 @@ pub(crate) struct DirectKind {
 impl DirectKind {
     pub(crate) fn of(features: &Features, shadows: bool, named: bool) -> Self {
         let delta_lights = features.point_lights + features.spot_lights + features.directional_lights > 0;
-        Self { delta_lights, area_lights: features.area_lights > 0, shadows, named }
+        Self { delta_lights, area_lights: features.area_lights > 0, sky: features.skies > 0, shadows, named }
     }
 }
 
@@ -36,10 +38,11 @@ impl DirectKind {
 #[derive(Debug)]
 pub(crate) struct Deferred {
     gbuffer: wgpu::RenderPipeline,
-    /// The same for a scene with textures, and the composite.
-    textured: Option<[wgpu::RenderPipeline; 2]>,
+    /// The same for a scene with textures.
+    textured: Option<wgpu::RenderPipeline>,
     direct: Option<(DirectKind, wgpu::RenderPipeline)>,
-    composite: wgpu::RenderPipeline,
+    /// With a sky, with textures, or without.
+    composite: Option<([bool; 2], wgpu::RenderPipeline)>,
     /// Stands in for what a picture does not need.
     pub(crate) open: Target,
     nobody: Target,
@@ -53,6 +56,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) owners: Option<&'a wgpu::TextureView>,
     pub(crate) colours: &'a wgpu::Buffer,
     pub(crate) tallies: &'a wgpu::Buffer,
+    pub(crate) sky: &'a SkyOnDevice,
     /// Whether the scene has textures.
     pub(crate) textured: bool,
 }
@@ -68,13 +72,10 @@ fn gbuffer_drawing() -> Drawing<'static> {
     }
 }
 
-fn textured(gpu: &Gpu) -> [wgpu::RenderPipeline; 2] {
+fn textured(gpu: &Gpu) -> wgpu::RenderPipeline {
     let corners = Some(TextureCorner::layout());
     let set = Drawing { second: true, texture_corners: corners, ..gbuffer_drawing() };
-    [
-        pipelines::drawing(gpu, &shader::GBUFFER_TEXTURED, &set),
-        pipelines::covering(gpu, &shader::COMPOSITE, "layer_textured", HDR, &[]),
-    ]
+    pipelines::drawing(gpu, &shader::GBUFFER_TEXTURED, &set)
 }
 
 impl Deferred {
@@ -88,7 +89,7 @@ impl Deferred {
             gbuffer: pipelines::drawing(gpu, &shader::GBUFFER, &gbuffer_drawing()),
             textured: None,
             direct: None,
-            composite: pipelines::covering(gpu, &shader::COMPOSITE, "layer", HDR, &[]),
+            composite: None,
             open,
             nobody: Target::new(gpu, "nobody", [1, 1], GBUFFER, usage),
         }
@@ -124,7 +125,7 @@ impl Deferred {
         sees: impl Fn(Vec3, f32) -> bool,
     ) -> u32 {
         targets.prepare_texel(scope.gpu);
-        let [pipeline, _] = self.textured.get_or_insert_with(|| textured(scope.gpu));
+        let pipeline = self.textured.get_or_insert_with(|| textured(scope.gpu));
         let resources = [whole(scope.frame), whole(&textures.texels), whole(&textures.layouts)];
         let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
         let edge = scope.alone("G-buffer");
@@ -155,6 +156,7 @@ impl Deferred {
             let constants = [
                 ("DELTA_LIGHTS", f64::from(kind.delta_lights)),
                 ("AREA_LIGHTS", f64::from(kind.area_lights)),
+                ("SKY", f64::from(kind.sky)),
                 ("SHADOWS", f64::from(kind.shadows)),
                 ("NAMED_MAPS", f64::from(kind.named)),
             ];
@@ -179,7 +181,16 @@ impl Deferred {
     }
 
     /// The layer that the frame uniform asks for.
-    pub(crate) fn encode_composite(&self, scope: &mut Scope<'_>, targets: &Targets, shown: &Shown<'_>) {
+    pub(crate) fn encode_composite(&mut self, scope: &mut Scope<'_>, targets: &Targets, shown: &Shown<'_>) {
+        let texel = targets.texel.as_ref().filter(|_| shown.textured);
+        let kind = [shown.sky.is_there(), texel.is_some()];
+        if self.composite.as_ref().is_none_or(|(k, _)| *k != kind) {
+            let constants = [("SKY", f64::from(kind[0]))];
+            let entry = if texel.is_some() { "layer_textured" } else { "layer" };
+            let pipeline = pipelines::covering(scope.gpu, &shader::COMPOSITE, entry, HDR, &constants);
+            self.composite = Some((kind, pipeline));
+        }
+        let Some((_, pipeline)) = &self.composite else { return };
         let resources = [
             whole(scope.frame),
             texture(&targets.gbuffer.view),
@@ -190,12 +201,10 @@ impl Deferred {
             texture(shown.owners.unwrap_or(&self.nobody.view)),
             whole(shown.colours),
             whole(shown.tallies),
+            whole(&shown.sky.numbers),
+            texture(&shown.sky.map),
+            texel.and_then(|texel| texture(&texel.view)),
         ];
-        let (mut resources, mut pipeline) = (resources.to_vec(), &self.composite);
-        if let (true, Some([_, textured]), Some(texel)) = (shown.textured, &self.textured, &targets.texel) {
-            resources.push(texture(&texel.view));
-            pipeline = textured;
-        }
         let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
         let edge = scope.alone("composite");
         scope.cover(edge, pipeline, &group, &targets.output.view);

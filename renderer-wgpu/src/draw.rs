@@ -134,6 +134,7 @@ impl Renderer {
                 with_maps,
                 // Triangles with holes are not told by their names alone.
                 scene.geometry.is_readable(&self.gpu) && holes.is_none(),
+                view.sample,
             );
             let (new_views, _) = self.maps.update(&self.gpu, table);
             if with_maps && (new_views || done.is_stale(Stage::Maps, view, versions)) {
@@ -148,6 +149,7 @@ impl Renderer {
                     size,
                     lights: &self.maps.lights,
                     patches: &self.maps.lights,
+                    sky: &self.sky,
                     count: scene.lights.len() as u32,
                     sample: view.sample,
                     output: &targets.direct.view,
@@ -181,6 +183,7 @@ impl Renderer {
                     size,
                     lights: &self.vsls.lights,
                     patches: &self.vsls.patches,
+                    sky: &self.sky,
                     count: self.vsls.count,
                     sample: view.sample,
                     output: &targets.indirect.view,
@@ -228,6 +231,7 @@ impl Renderer {
             colours: &self.owners.colours,
             tallies: &self.gather.tallies,
             textured: scene.textures.is_some(),
+            sky: &self.sky,
         };
         self.deferred.encode_composite(&mut scope, targets, &shown);
         if view.show == Show::Discs {

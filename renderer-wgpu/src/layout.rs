@@ -21,6 +21,8 @@ pub(crate) const STEEP_PIXELS: f32 = 16.0;
 pub(crate) const MAP_SEED: u32 = 0x6D61_7073;
 /// Means: every light.
 pub(crate) const ALL_LIGHTS: u32 = u32::MAX;
+/// Means: no light.
+pub(crate) const NO_LIGHT: u32 = u32::MAX;
 /// Means: nobody owns this.
 pub(crate) const NO_OWNER: u32 = u32::MAX;
 /// Texels by which a receiver is moved off its surface before it is looked up in a shadow map.
@@ -184,6 +186,22 @@ shared! {
         first_map: u32,
         maps: u32,
         map_points: u32,
+        first_direction: u32,
+        pad_0: u32,
+    }
+
+    /// Twin of `Sky` in sky.wgsl.
+    SkyUniform as "Sky" {
+        zenith: [f32; 3],
+        kind: u32,
+        horizon: [f32; 3],
+        channels: f32,
+        ground: [f32; 3],
+        turn: f32,
+        power: [f32; 3],
+        width: u32,
+        height: u32,
+        light: u32,
         pad_0: u32,
         pad_1: u32,
     }

@@ -25,6 +25,7 @@ mod scope;
 mod shader;
 mod shadow_maps;
 mod shadow_views;
+mod sky;
 mod stages;
 mod targets;
 pub mod test_gpu;

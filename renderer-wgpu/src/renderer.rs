@@ -11,6 +11,7 @@ use crate::{
     present::Present,
     rays::Rays,
     shadow_maps::ShadowMaps,
+    sky::SkyOnDevice,
     stages::{Done, Versions},
     targets::Targets,
     textures::Textures,
@@ -31,6 +32,7 @@ pub struct Renderer {
     pub(crate) present: Option<Present>,
     pub(crate) scene: Option<OnDevice>,
     pub(crate) maps: ShadowMaps,
+    pub(crate) sky: SkyOnDevice,
     pub(crate) vsls: VslBuffer,
     pub(crate) deferred: Deferred,
     pub(crate) gather: Gather,
@@ -71,6 +73,7 @@ impl Renderer {
             present: None,
             scene: None,
             maps: ShadowMaps::new(&gpu),
+            sky: SkyOnDevice::new(&gpu),
             vsls: VslBuffer::new(&gpu),
             deferred: Deferred::new(&gpu),
             gather: Gather::new(&gpu),
@@ -117,6 +120,7 @@ impl Renderer {
         let (lo, hi) = scene.bvh.bounds();
         let magnitude = lo.abs().max(hi.abs()).max_element();
         let magnitude = if magnitude.is_finite() { magnitude } else { 0.0 };
+        self.sky.update(&self.gpu, &scene.lights)?;
         let (geometry, last_textures, changed) = match self.scene.take() {
             None => {
                 (Geometry::new(&self.gpu, scene)?, None, geometry::Changed { shape: true, materials: true })

@@ -57,10 +57,10 @@ sources! {
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];
     AO_SMOOTH = "ao_smooth" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     OWNER = "owner" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, VSL];
-    COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
+    COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::BASIS, wgsl::SKY, FRAME];
     DISC = "disc" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
     RAYS_DIRECT = "rays_direct" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, wgsl::BASIS, wgsl::SKY, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_INDIRECT = "rays_indirect" [
         wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL

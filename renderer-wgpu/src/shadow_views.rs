@@ -1,10 +1,11 @@
 //! Turns lights into the table that shaders read, and into the views from which their shadow maps are drawn.
 
 use crate::layout::{AREA_FACES, LightUniform, MAP_SEED, NO_LAYER, ShadowView};
+use core::f32::consts::PI;
 use glam::{Mat4, Vec3, Vec4};
 use photonstream_scene::SceneLight;
 use photonstream_shading::{
-    LightShape, basis, light::Bounds, sobol::Sequence, surface::RELATIVE_OFFSET, wgsl,
+    LightShape, Sky, basis, light::Bounds, sobol::Sequence, surface::RELATIVE_OFFSET, wgsl,
 };
 
 /// Most shadow maps of a scene: layers of one texture.
@@ -24,14 +25,15 @@ pub(crate) struct LightTable {
 }
 
 impl LightTable {
-    /// The table of `lights`; area lights have maps around up to `points` of their points, the maps of others name
-    /// triangles where `maps_are_named`.
+    /// The table of `lights`; area lights have maps around up to `points` of their points, a sky those of up to four times as
+    /// many directions, which are others for each `sample`; the maps of others name triangles where `maps_are_named`.
     pub(crate) fn new(
         lights: &[SceneLight],
         bounds: Bounds,
         points: u32,
         with_maps: bool,
         maps_are_named: bool,
+        sample: u32,
     ) -> Self {
         let shapes = || lights.iter().map(|l| &l.light.shape);
         let wanted = |points| shapes().map(|s| maps_of(s, points)).sum::<u32>();
@@ -48,6 +50,7 @@ impl LightTable {
             13..=48 => 512,
             _ => 256,
         };
+        let mut suns = Vec::new();
         for (index, light) in lights.iter().enumerate() {
             let shape = &light.light.shape;
             let maps = maps_of(shape, points);
@@ -58,10 +61,22 @@ impl LightTable {
             }
             let maps = if fits { maps } else { 0 };
             let mut entry = light_uniform(shape, light.light.power);
+            if let LightShape::Sky { sky } = shape {
+                suns.push((index, sky_suns(sky, light.light.power, index, points * SKY_POINTS, sample)));
+            }
             (entry.first_map, entry.maps, entry.map_points) = (first_map, maps, points);
             if maps > 0 {
-                let sample = |k: u32| Sequence::new(MAP_SEED.into(), index as u32).sample(k.into()).next_2d();
-                views(shape, &entry, bounds, table.resolution, points, sample, &mut table.views);
+                let sample_of =
+                    |k: u32| Sequence::new(MAP_SEED.into(), index as u32).sample(k.into()).next_2d();
+                views(shape, &entry, bounds, table.resolution, points, sample_of, &mut table.views);
+                if let Some((_, suns)) = suns.last_mut().filter(|(of, _)| *of == index) {
+                    let beams = suns.iter_mut().zip(first_map..);
+                    beams.for_each(|(sun, map)| {
+                        let direction = Vec3::from(sun.direction);
+                        table.views.push(beam_view(direction, bounds, table.resolution));
+                        (sun.first_map, sun.maps) = (map, 1);
+                    });
+                }
                 if maps_are_named && shape.is_delta() {
                     for view in &mut table.views[first_map as usize..] {
                         view.layer = table.named;
@@ -71,11 +86,32 @@ impl LightTable {
             }
             table.lights.push(entry);
         }
+        for (index, suns) in suns {
+            table.lights[index].first_direction = table.lights.len() as u32;
+            table.lights[index].map_points = suns.len() as u32;
+            table.lights.extend(suns);
+        }
         if table.views.is_empty() {
             table.resolution = 0;
         }
         table
     }
+}
+
+/// Directions of a sky for each point of an area light.
+const SKY_POINTS: u32 = 4;
+
+/// Directions drawn by a sky's importance as parallel lights without maps, of `count` those with the number `sample`.
+fn sky_suns(sky: &Sky, power: Vec3, index: usize, count: u32, sample: u32) -> Vec<LightUniform> {
+    let sequence = Sequence::new(MAP_SEED.into(), index as u32);
+    let sun = |k: u32| {
+        let u = sequence.sample(u64::from(sample) * u64::from(count) + u64::from(k)).next_2d();
+        let drawn = sky.sample(u);
+        let irradiance = drawn.relative * (4.0 * PI / sky.importance(drawn.relative) / count as f32);
+        let shape = LightShape::Directional { direction: -drawn.wi };
+        light_uniform(&shape, if irradiance.is_finite() { power * irradiance } else { Vec3::ZERO })
+    };
+    (0..count).map(sun).collect()
 }
 
 /// Half angle (as its cosine) up to which a spot has one map; wider ones have a cube.
@@ -93,6 +129,7 @@ fn maps_of(shape: &LightShape, points: u32) -> u32 {
         }
         LightShape::Directional { .. } => 1,
         LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => AREA_FACES * points,
+        LightShape::Sky { .. } => SKY_POINTS * points,
     }
 }
 
@@ -108,6 +145,7 @@ pub(crate) fn light_uniform(shape: &LightShape, power: Vec3) -> LightUniform {
             (entry.versine_inner, entry.versine_outer) = (versine_inner, versine_outer);
         }
         LightShape::Directional { direction } => entry.direction = direction.to_array(),
+        LightShape::Sky { .. } => {}
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
             entry.position = corner.to_array();
@@ -139,18 +177,12 @@ fn views(
     sample: impl Fn(u32) -> [f32; 2],
     out: &mut Vec<ShadowView>,
 ) {
-    // The filter reaches two texels beyond an edge.
-    let margin = 1.0 + 4.0 / resolution as f32;
+    let margin = margin(resolution);
     let near = bounds.radius.max(f32::MIN_POSITIVE) * 1e-4;
     match *shape {
-        LightShape::Directional { direction } => {
-            let (right, up) = basis::tangents(direction);
-            out.push(parallel_view(
-                &Frame { position: bounds.centre, right, up, forward: direction },
-                bounds.radius * margin,
-                resolution,
-            ));
-        }
+        LightShape::Directional { direction } => out.push(beam_view(direction, bounds, resolution)),
+        // Its directions are lights of their own.
+        LightShape::Sky { .. } => {}
         LightShape::Spot { position, direction, versine_outer, .. } if entry.maps == 1 => {
             let cos = 1.0 - versine_outer;
             let tan = (versine_outer * (2.0 - versine_outer)).sqrt() / cos;
@@ -188,6 +220,18 @@ fn views(
             }
         }
     }
+}
+
+/// The view of a beam that covers the whole scene.
+fn beam_view(direction: Vec3, bounds: Bounds, resolution: u32) -> ShadowView {
+    let (right, up) = basis::tangents(direction);
+    let frame = Frame { position: bounds.centre, right, up, forward: direction };
+    parallel_view(&frame, bounds.radius * margin(resolution), resolution)
+}
+
+/// The filter reaches two texels beyond an edge.
+fn margin(resolution: u32) -> f32 {
+    1.0 + 4.0 / resolution as f32
 }
 
 /// The faces of a cube in the directions of a frame: right, left, up, down, forward, back.

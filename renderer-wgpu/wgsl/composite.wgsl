@@ -9,9 +9,14 @@
 // A colour for each light: who owns what, radiosity or age.
 @group(0) @binding(7) var<storage, read> colours: array<vec4f>;
 @group(0) @binding(8) var<storage, read> tallies: array<vec2f>;
+@group(0) @binding(9) var<uniform> sky: Sky;
+@group(0) @binding(10) var sky_map: texture_2d<f32>;
+
+// Whether the scene has a sky: else nothing of it is compiled in.
+override SKY: bool = true;
 
 // Colours of textures, as bits.
-@group(0) @binding(9) var texel: texture_2d<u32>;
+@group(0) @binding(11) var texel: texture_2d<u32>;
 
 @vertex
 fn cover(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
@@ -33,7 +38,13 @@ fn layer_textured(@builtin(position) at: vec4f) -> @location(0) vec4f {
 fn layer_of(pixel: vec2u, texture_colour: vec3f) -> vec4f {
     let word = textureLoad(gbuffer, pixel, 0);
     if !surface_is_there(word) {
-        return vec4f(0.0, 0.0, 0.0, 1.0);
+        var background = vec3f(0.0);
+        if SKY && (frame.show == SHOW_FULL || frame.show == SHOW_DIRECT) {
+            if frame.only_light == ALL_LIGHTS || frame.only_light == sky.light {
+                background = sky.power * sky_relative(pixel_ray(pixel));
+            }
+        }
+        return vec4f(finite(background), 1.0);
     }
     let surface = surface_unpack(word, pixel);
     let object = objects[surface.object];

@@ -13,6 +13,7 @@
 // What the scene has: the rest is not compiled in.
 override DELTA_LIGHTS: bool = true;
 override AREA_LIGHTS: bool = true;
+override SKY: bool = true;
 override SHADOWS: bool = true;
 // Whether the maps of lights without extent name triangles.
 override NAMED_MAPS: bool = true;
@@ -41,6 +42,14 @@ fn arrive(@builtin(position) at: vec4f) -> @location(0) vec4f {
             if DELTA_LIGHTS {
                 irradiance += arriving(light, surface, origin, vec2f(0.5), light.first_map);
             }
+        } else if light.kind == LIGHT_SKY {
+            if SKY {
+                // Directions that all pixels share: each has its map, of depths.
+                for (var k = 0u; k < light.map_points; k++) {
+                    let sun = lights[light.first_direction + k];
+                    irradiance += arriving_from_sky(sun, surface);
+                }
+            }
         } else if AREA_LIGHTS {
             // Points that all pixels share: each has its maps.
             var sum = vec3f(0.0);
@@ -52,6 +61,19 @@ fn arrive(@builtin(position) at: vec4f) -> @location(0) vec4f {
         }
     }
     return vec4f(irradiance, 0.0);
+}
+
+// Irradiance from one direction of a sky.
+fn arriving_from_sky(sun: Light, surface: Surface) -> vec3f {
+    let cos_theta = -dot(surface.normal, sun.direction);
+    if cos_theta <= 0.0 {
+        return vec3f(0.0);
+    }
+    var lit = 1.0;
+    if SHADOWS && sun.maps > 0u {
+        lit = shadow_lit(sun.first_map, surface.position, surface.normal, cos_theta);
+    }
+    return sun.power * (cos_theta * lit);
 }
 
 // Irradiance through one point of a light.

@@ -3,6 +3,8 @@
 @group(0) @binding(1) var gbuffer: texture_2d<u32>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 @group(0) @binding(3) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(5) var<uniform> sky: Sky;
+@group(0) @binding(6) var sky_map: texture_2d<f32>;
 
 // A ray that decides over some irradiance.
 struct Question {
@@ -93,6 +95,14 @@ fn trace_direct(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn ask(light: Light, surface: Surface, origin: vec3f, u: vec2f) -> Question {
+    if light.kind == LIGHT_SKY {
+        // Its rows and columns are looked up in loops.
+        walk_turns += SKY_TURNS;
+        let from_sky = sky_sample_above(surface.normal, u);
+        let arriving = light.power * from_sky.irradiance * dot(surface.normal, from_sky.wi);
+        let asked = dot(surface.normal, from_sky.wi) > 0.0 && any(arriving > vec3f(0.0));
+        return Question(from_sky.wi, F32_MAX, arriving, asked);
+    }
     let reached = light_illuminate(light, surface.position, u);
     let cos_theta = dot(surface.normal, reached.wi);
     let arriving = light.power * (reached.irradiance * cos_theta);

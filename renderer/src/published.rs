@@ -130,7 +130,11 @@ fn lights(scene: &Scene, records: &[LightRecord]) -> Result<Vec<Published>, Rend
         return Err(RenderError::Scene { reason });
     }
     let object = |record: &LightRecord| (record.object != u32::MAX).then_some(ObjectId(record.object));
-    records.iter().enumerate().map(|(i, r)| Ok((light(i, r)?, r.enabled != 0, object(r)))).collect()
+    records
+        .iter()
+        .enumerate()
+        .map(|(i, r)| Ok((light(i, r, &scene.lights[i].light.shape)?, r.enabled != 0, object(r))))
+        .collect()
 }
 
 fn put_lights(scene: &mut Scene, lights: Vec<Published>) {
@@ -139,7 +143,8 @@ fn put_lights(scene: &mut Scene, lights: Vec<Published>) {
     }
 }
 
-fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
+/// The light of a record; what a sky looks like is known from the text alone, `loaded`.
+fn light(index: usize, record: &LightRecord, loaded: &LightShape) -> Result<Light, RenderError> {
     let wrong = |field, found: String, expected| RenderError::Light { index, field, found, expected };
     let finite = |field, v: [f32; 3]| {
         let v = Vec3::from(v);
@@ -175,8 +180,10 @@ fn light(index: usize, record: &LightRecord) -> Result<Light, RenderError> {
         2 => LightShape::Directional { direction: unit()? },
         3 => LightShape::Parallelogram { corner: position, edge_u, edge_v },
         4 => LightShape::Triangle { corner: position, edge_u, edge_v },
+        5 if loaded.sky().is_some() => loaded.clone(),
+        5 => return Err(wrong("kind", "5, a sky".into(), "what the scene's text has in this place")),
         kind => {
-            return Err(wrong("kind", kind.to_string(), "0 to 4; this renderer is older than the simulator"));
+            return Err(wrong("kind", kind.to_string(), "0 to 5; this renderer is older than the simulator"));
         }
     };
     let power = finite("power", record.power)?;

@@ -15,6 +15,8 @@ pub struct Features {
     pub directional_lights: u32,
     /// Number of area lights: parallelograms and triangles.
     pub area_lights: u32,
+    /// Number of skies: 0 or 1.
+    pub skies: u32,
     /// Columns of flux, one for each light up to the configured number.
     pub light_columns: u32,
     /// Number of objects.
@@ -63,7 +65,10 @@ impl Features {
             point_lights: count(|s| matches!(s, LightShape::Point { .. })),
             spot_lights: count(|s| matches!(s, LightShape::Spot { .. })),
             directional_lights: count(|s| matches!(s, LightShape::Directional { .. })),
-            area_lights: count(|s| !s.is_delta()),
+            area_lights: count(|s| {
+                matches!(s, LightShape::Parallelogram { .. } | LightShape::Triangle { .. })
+            }),
+            skies: count(|s| s.sky().is_some()),
             light_columns: light_columns.min(lights.len() as u32),
             objects: objects.len() as u32,
             two_sided_objects: objects.iter().filter(|o| o.sides == Sides::Both).count() as u32,
@@ -78,7 +83,7 @@ impl Features {
 
     /// Number of lights.
     pub fn lights(&self) -> u32 {
-        self.point_lights + self.spot_lights + self.directional_lights + self.area_lights
+        self.point_lights + self.spot_lights + self.directional_lights + self.area_lights + self.skies
     }
 
     /// Whether no surface ends in the open; see [`Features::open_edges`].
@@ -103,6 +108,7 @@ impl Features {
             lights("spot lights", self.spot_lights),
             lights("directional lights", self.directional_lights),
             lights("area lights", self.area_lights),
+            lights("sky", self.skies),
             Decision {
                 what: "flux per light",
                 modelled: self.light_columns > 1,
@@ -124,9 +130,10 @@ impl Features {
             },
             Decision {
                 what: "escaping light",
-                modelled: !self.is_closed() || self.directional_lights > 0,
-                reason: match (self.open_edges, self.directional_lights) {
+                modelled: !self.is_closed() || self.directional_lights + self.skies > 0,
+                reason: match (self.open_edges, self.directional_lights + self.skies) {
                     (0, 0) => "every edge joins triangles: no surface ends in the open".into(),
+                    (0, _) if self.skies > 0 => "light of the sky comes from outside".into(),
                     (0, _) => "directional light comes from outside".into(),
                     (1, _) => "1 edge has a triangle on one side only".into(),
                     (n, _) => format!("{n} edges have a triangle on one side only"),

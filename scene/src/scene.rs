@@ -47,6 +47,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Light sources, ordered by name.
     pub lights: Vec<SceneLight>,
+    /// The light from all directions, if there is one.
+    pub sky: Option<LightId>,
     /// From where pictures are taken.
     pub camera: Camera,
     /// Settings of the simulation.
@@ -252,6 +254,13 @@ impl Scene {
     #[inline]
     pub fn albedo(&self, object: ObjectId) -> Vec3 {
         self.materials[self.objects[object.0 as usize].material.0 as usize].albedo
+    }
+
+    /// The radiance (W m⁻² sr⁻¹) that comes from infinitely far away in the direction `wi` of unit length: what a ray sees
+    /// that hits nothing.
+    #[inline]
+    pub fn background(&self, wi: Vec3) -> Vec3 {
+        self.sky.map_or(Vec3::ZERO, |sky| self.lights[sky.0 as usize].light.background(wi))
     }
 
     /// The radiance (W m⁻² sr⁻¹) that `side` of an object emits.

@@ -3,7 +3,7 @@
 //! A twin has the file stem, names, parameter order and expression order of its Rust function. Constants are printed
 //! from Rust, never typed twice.
 
-use crate::{LightShape, distance_map, patch, surface, texture::Wrap, tone::ToneMap};
+use crate::{LightShape, Sky, distance_map, patch, sky::Spread, surface, texture::Wrap, tone::ToneMap};
 use core::f32::consts::{FRAC_1_PI, PI};
 use std::fmt::Write;
 
@@ -23,6 +23,9 @@ pub const LIGHT: &str = include_str!("../wgsl/light.wgsl");
 pub const OCTAHEDRAL: &str = include_str!("../wgsl/octahedral.wgsl");
 /// Twin of [`crate::patch`].
 pub const PATCH: &str = include_str!("../wgsl/patch.wgsl");
+/// Twin of [`crate::sky`], without photons; the module that includes it has `sky: Sky` and `sky_map: texture_2d<f32>`, and
+/// [`BASIS`].
+pub const SKY: &str = include_str!("../wgsl/sky.wgsl");
 /// Twin of [`crate::sobol`].
 pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
 /// Twin of [`crate::texture`]; the module that includes it has `texels: array<vec2u>`.
@@ -31,7 +34,7 @@ pub const TEXTURE: &str = include_str!("../wgsl/texture.wgsl");
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 11] = [
+pub const TWINS: [(&str, &str); 12] = [
     ("kernel", KERNEL),
     ("basis", BASIS),
     ("distance_map", DISTANCE_MAP),
@@ -40,6 +43,7 @@ pub const TWINS: [(&str, &str); 11] = [
     ("light", LIGHT),
     ("octahedral", OCTAHEDRAL),
     ("patch", PATCH),
+    ("sky", SKY),
     ("sobol", SOBOL),
     ("texture", TEXTURE),
     ("tone", TONE),
@@ -53,10 +57,21 @@ pub fn light_kind(shape: &LightShape) -> u32 {
         LightShape::Directional { .. } => 2,
         LightShape::Parallelogram { .. } => 3,
         LightShape::Triangle { .. } => 4,
+        LightShape::Sky { .. } => 5,
     }
 }
 
-const LIGHT_KINDS: [&str; 5] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM", "TRIANGLE"];
+const LIGHT_KINDS: [&str; 6] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM", "TRIANGLE", "SKY"];
+
+/// Number of a sky's kind in shaders.
+pub fn sky_kind(sky: &Sky) -> u32 {
+    match sky.spread() {
+        Spread::Gradient(_) => 0,
+        Spread::Map(..) => 1,
+    }
+}
+
+const SKY_KINDS: [&str; 2] = ["GRADIENT", "MAP"];
 
 /// The constants that shaders share with Rust, as WGSL declarations.
 pub fn constants() -> String {
@@ -81,6 +96,9 @@ pub fn constants() -> String {
     for (wrap, name) in [(Wrap::Repeat, "REPEAT"), (Wrap::Mirror, "MIRROR"), (Wrap::Clamp, "CLAMP")] {
         let _ = writeln!(text, "const TEXTURE_{name}: u32 = {}u;", wrap as u32);
     }
+    for (number, name) in SKY_KINDS.iter().enumerate() {
+        let _ = writeln!(text, "const SKY_{name}: u32 = {number}u;");
+    }
     for (number, map) in ToneMap::ALL.iter().enumerate() {
         let _ = writeln!(text, "const TONE_MAP_{}: u32 = {number}u;", map.name().to_uppercase());
     }
@@ -95,7 +113,7 @@ pub fn tone_map_number(map: ToneMap) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
+    use glam::{DVec3, Vec3};
 
     #[test]
     fn constants_have_their_values_and_kinds_their_numbers() {
@@ -113,6 +131,7 @@ mod tests {
             LightShape::Directional { direction: Vec3::X },
             LightShape::Parallelogram { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
             LightShape::Triangle { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
+            LightShape::Sky { sky: Sky::gradient(DVec3::ONE, DVec3::ONE, DVec3::ONE).into() },
         ];
         for (shape, name) in shapes.iter().zip(LIGHT_KINDS) {
             assert!(text.contains(&format!("const LIGHT_{name}: u32 = {}u;", light_kind(shape))), "{text}");

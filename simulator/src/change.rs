@@ -138,9 +138,9 @@ fn light_revisions(old: &Simulation, new: &Simulation) -> Vec<LightRevision> {
     lights
         .zip(slots)
         .map(|((old, new), (old_slots, new_slots))| {
-            // The beam of a sun covers the whole scene.
-            let is_sun = matches!(new.light.shape, LightShape::Directional { .. });
-            let is_elsewhere = old.light.shape != new.light.shape || (is_sun && has_other_bounds);
+            // The beam of a sun or sky covers the whole scene.
+            let is_distant = new.light.shape.is_distant();
+            let is_elsewhere = old.light.shape != new.light.shape || (is_distant && has_other_bounds);
             LightRevision::of_slots(old_slots, new_slots, is_elsewhere)
         })
         .collect()
@@ -211,11 +211,11 @@ pub(crate) fn obstacle(scene: &Scene, object: &Object, reach: f32) -> Option<Obs
 
 /// No coordinate of a path's points is larger.
 pub(crate) fn reach_of(scene: &Scene) -> f32 {
-    // The beam of a sun starts on a disc beside the scene's sphere.
+    // The beam of a sun or sky starts on a disc beside the scene's sphere.
     let around = scene.bounds.centre.abs().max_element() + 3.0 * scene.bounds.radius;
     let position = |shape: &LightShape| match *shape {
         LightShape::Point { position } | LightShape::Spot { position, .. } => position.abs().max_element(),
-        LightShape::Directional { .. } => 0.0,
+        LightShape::Directional { .. } | LightShape::Sky { .. } => 0.0,
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
             corner.abs().max_element() + edge_u.length() + edge_v.length()

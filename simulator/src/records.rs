@@ -113,6 +113,8 @@ pub fn light_records(scene: &Scene) -> Vec<LightRecord> {
                 ..LightRecord::default()
             };
             match light.light.shape {
+                // Renderers have its radiances from the text.
+                LightShape::Sky { .. } => record.kind = 5,
                 LightShape::Point { position } => record.position = position.to_array(),
                 LightShape::Spot { position, direction, versine_inner, versine_outer } => {
                     record.kind = 1;

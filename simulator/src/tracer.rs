@@ -151,7 +151,7 @@ impl Tracer {
             samples.push(light.sequence.sample(index));
         }
         samples.next_2d(&mut wave.first, &mut wave.second);
-        // Only area lights start photons from a place that is sampled, too.
+        // Only area lights and skies start photons from a place that is sampled, too.
         let area = !shape.is_delta();
         if area {
             samples.next_2d(&mut wave.directions.x, &mut wave.directions.y);

@@ -1,12 +1,14 @@
 //! Turns a scene into files that Mitsuba 3 renders: an independent program that says what the picture should be.
 //!
 //! Everything is written in the scene's own space, metres around [`Scene::origin_m`], with the f32 coordinates that our
-//! rays meet. All that is approximated is the smooth edge of a spot light (see [`spot`]).
+//! rays meet. All that is approximated is the smooth edge of a spot light (see [`spot`]), and skies but constant ones, whose
+//! texels Mitsuba interpolates.
 #![forbid(unsafe_code)]
 
 mod document;
 mod ply;
 mod sensor;
+mod sky;
 pub mod spot;
 mod surfaces;
 mod textures;
@@ -56,6 +58,7 @@ pub enum ExportError {
 /// - `full.xml`: the same without a limit of depth, our layer `full`;
 /// - `meshes/*.ply`: one mesh for each object;
 /// - `textures/*.pfm`: what albedos are multiplied by, and where holes are, at four times the resolution;
+/// - `sky.exr`: radiances of a sky that is not constant;
 /// - `scene.toml`: the scene as our own programs read it, at the moment that is exported.
 ///
 /// # Errors
@@ -86,6 +89,9 @@ pub fn export(scene: &Scene, folder: &Path) -> Result<Exported, ExportError> {
     }
     for (name, bytes) in textures {
         write(folder.join(name), &bytes)?;
+    }
+    if let Some(bytes) = sky::map(scene) {
+        write(folder.join(sky::FILE), &bytes)?;
     }
     for (index, object) in scene.objects.iter().enumerate() {
         let bytes = ply::encode(&scene.geometry, object.triangles.clone());

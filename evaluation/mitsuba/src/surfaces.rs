@@ -2,7 +2,7 @@
 
 use super::{
     document::{Document, identifier},
-    spot, textures,
+    sky, spot, textures,
 };
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -107,6 +107,10 @@ fn write_light(light: &Light, document: &mut Document) -> usize {
             document.leaf("vector", &[("name", &"direction"), ("x", &x), ("y", &y), ("z", &z)]);
             document.rgb("irradiance", light.power);
             document.end();
+            1
+        }
+        LightShape::Sky { ref sky } => {
+            sky::write(sky, light.power, document);
             1
         }
         // Emitted by their object.

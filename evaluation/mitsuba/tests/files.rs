@@ -200,7 +200,7 @@ fn cones_follow_the_smooth_edge() {
                 .sum();
             let (sin, cos) = angle.to_radians().sin_cos();
             let ours = shape.illuminate(Vec3::new(sin as f32, 0.0, cos as f32), [0.5; 2]);
-            let ours = ours.map_or(0.0, |i| f64::from(i.irradiance)) / on_axis;
+            let ours = ours.map_or(0.0, |i| f64::from(i.irradiance.x)) / on_axis;
             assert!((ours - theirs).abs() < 4e-4, "{inner}–{outer}° at {angle}°: {ours} and {theirs}");
         }
     }
@@ -236,4 +236,42 @@ fn the_camera_is_the_scenes() {
         let include = document.descendants().find(|n| n.has_tag_name("include")).unwrap();
         assert_eq!(include.attribute("filename"), Some("scene.xml"));
     }
+}
+
+/// A constant sky is Mitsuba's `constant`, another an `envmap` of the same radiances: the texel at a quarter of the width looks
+/// at +X, the left edge at −Z.
+#[test]
+fn skies_are_written_as_constant_or_map() {
+    let scene = |sky: &str| {
+        let text =
+            format!("{}\n[light.sky]\nsky = {{ {sky} }}\n", SCENE.replace("origin_m = [3000, 0, 0]", ""));
+        SceneConfig::from_text(&text, Path::new("sky.toml")).unwrap().build().unwrap()
+    };
+    let (folder, text) = exported(&scene("radiance_w_m2_sr = [1, 2, 3], scale = 2"));
+    let document = Document::parse(&text).unwrap();
+    let [constant] = of_type(&document, "emitter", "constant")[..] else { panic!("one constant emitter") };
+    assert_near(&numbers(property(constant, "radiance")), &[2.0, 4.0, 6.0], 1e-6);
+    assert!(!folder.path().join("sky.exr").exists());
+
+    let scene = scene("zenith_w_m2_sr = [1, 2, 3], horizon_w_m2_sr = 1, ground_w_m2_sr = 0.5, scale = 2");
+    let (folder, text) = exported(&scene);
+    let document = Document::parse(&text).unwrap();
+    let [map] = of_type(&document, "emitter", "envmap")[..] else { panic!("one map") };
+    assert_eq!(property(map, "filename"), "sky.exr");
+    use exr::prelude::{ReadChannels, ReadLayers};
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.0, vec![[0f32; 3]; size.area()]),
+            |(width, texels), at, (r, g, b): (f32, f32, f32)| texels[at.1 * *width + at.0] = [r, g, b],
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(folder.path().join("sky.exr"))
+        .unwrap();
+    let (width, texels) = &image.layer_data.channel_data.pixels;
+    // Half a texel below the zenith, and below the horizon.
+    assert!((Vec3::from(texels[0]) - Vec3::new(2.0, 4.0, 6.0)).abs().max_element() < 1e-4);
+    assert_eq!(texels[texels.len() - width], [1.0; 3]);
 }

@@ -19,23 +19,23 @@ pub(super) fn irradiance(samples: u64) -> Vec<Figure> {
     let area = LightShape::Parallelogram { corner: position, edge_u, edge_v };
     let normal = edge_u.as_dvec3().cross(edge_v.as_dvec3()).normalize();
     // A light that says it does not reach the point is infinitely wrong: each is asked where it does.
-    let of = |shape: LightShape, x: Vec3| shape.illuminate(x, [0.5; 2]).map_or(f32::NAN, |i| i.irradiance);
+    let of = |shape: &LightShape, x: Vec3| shape.illuminate(x, [0.5; 2]).map_or(f32::NAN, |i| i.irradiance.x);
     for i in 0..samples {
         let mut sample = Sequence::new(11, 0).sample(i);
         let direction = sampling::sphere(sample.next_2d());
         let x = position + direction * (10.0 + 90.0 * sample.next_1d());
         let d = position.as_dvec3() - x.as_dvec3();
         let r_sq = d.length_squared();
-        worst[0].take(ulps(of(LightShape::Point { position }, x), 1.0 / (4.0 * PI * r_sq)));
+        worst[0].take(ulps(of(&LightShape::Point { position }, x), 1.0 / (4.0 * PI * r_sq)));
         if -d.normalize().dot(axis.as_dvec3()) > 0.51 {
             let exact = 1.0 / (PI * (f64::from(inner) + f64::from(outer)) * r_sq);
-            worst[1].take(ulps(of(spot, x), exact));
+            worst[1].take(ulps(of(&spot, x), exact));
         }
         let d = d + (edge_u * 0.5 + edge_v * 0.5).as_dvec3();
         let cos = -d.normalize().dot(normal);
         if cos > 0.1 {
             // The sample stands 2⁻¹⁸ of 3.5 m off its surface, 11 ulps of the distance: twice, and in a cosine of 0.1.
-            worst[2].take(ulps(of(area, x), cos / (PI * d.length_squared())));
+            worst[2].take(ulps(of(&area, x), cos / (PI * d.length_squared())));
         }
     }
     vec![

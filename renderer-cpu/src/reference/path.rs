@@ -10,7 +10,7 @@ use photonstream_shading::{sampling, sobol::Sample};
 /// Radiance along a camera ray in W m⁻² sr⁻¹, in two parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathRadiance {
-    /// Emitted light and the first reflection.
+    /// Emitted light, that of the sky where nothing else is seen, and the first reflection.
     pub(crate) direct: Vec3,
     /// All later reflections.
     pub(crate) indirect: Vec3,

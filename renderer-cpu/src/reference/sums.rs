@@ -116,8 +116,11 @@ impl PixelTracer<'_> {
             PixelFilter::Centre => {
                 *rays += 1;
                 match self.see([0.5, 0.5]) {
-                    Some(surface) => Some(surface),
-                    None => return,
+                    Ok(surface) => Some(surface),
+                    Err(background) => {
+                        pixel.direct.iter_mut().for_each(|half| *half += background.as_dvec3() * size as f64);
+                        return;
+                    }
                 }
             }
             PixelFilter::Box => None,
@@ -126,11 +129,20 @@ impl PixelTracer<'_> {
             let sequence = Sequence::new(self.options.seed ^ (SECOND_HALF * half as u64), stream);
             for index in first..first + size {
                 let mut sample = sequence.sample(index);
-                let seen = centre.or_else(|| {
-                    *rays += 1;
-                    self.see(sample.next_2d())
-                });
-                let Some(surface) = seen else { continue };
+                let seen = centre.map_or_else(
+                    || {
+                        *rays += 1;
+                        self.see(sample.next_2d())
+                    },
+                    Ok,
+                );
+                let surface = match seen {
+                    Ok(surface) => surface,
+                    Err(background) => {
+                        pixel.direct[half] += background.as_dvec3();
+                        continue;
+                    }
+                };
                 let PathRadiance { direct, indirect } =
                     path::radiance(self.scene, self.lights, &surface, &mut sample, rays);
                 pixel.direct[half] += direct.as_dvec3();
@@ -139,10 +151,12 @@ impl PixelTracer<'_> {
         }
     }
 
-    fn see(&self, [u, v]: [f32; 2]) -> Option<Surface> {
+    /// The surface at a place of the pixel, or the radiance of what lies behind all surfaces.
+    fn see(&self, [u, v]: [f32; 2]) -> Result<Surface, Vec3> {
         let (width, height) = (self.options.width, self.options.height);
         let camera = &self.scene.camera;
         let direction = camera.direction(self.x as f32 + u, self.y as f32 + v, width, height);
         surface::first(self.scene, camera.position, direction, 0.0)
+            .ok_or_else(|| self.scene.background(direction))
     }
 }

@@ -7,3 +7,4 @@ mod options_and_layers;
 mod reference_closed_forms;
 mod reference_noise;
 mod scenes;
+mod sky;

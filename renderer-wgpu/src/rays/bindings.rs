@@ -28,6 +28,11 @@ impl Layouts {
             view_dimension,
             multisampled: false,
         };
+        let map = BindingType::Texture {
+            sample_type: TextureSampleType::Float { filterable: false },
+            view_dimension,
+            multisampled: false,
+        };
         let (access, format) = (StorageTextureAccess::WriteOnly, TextureFormat::Rgba32Float);
         let output = BindingType::StorageTexture { access, format, view_dimension };
         let layout = |bindings: &[(u32, BindingType)]| {
@@ -48,7 +53,15 @@ impl Layouts {
         let dispatch = buffer(BufferBindingType::Uniform, true);
         Self {
             inputs: [
-                layout(&[(0, frame), (1, gbuffer), (2, read()), (3, output), (4, read())]),
+                layout(&[
+                    (0, frame),
+                    (1, gbuffer),
+                    (2, read()),
+                    (3, output),
+                    (4, read()),
+                    (5, frame),
+                    (6, map),
+                ]),
                 layout(&[(0, frame), (4, write())]),
             ],
             tracing: layout(&[

@@ -28,7 +28,7 @@ mod noise;
 mod tests;
 mod tree;
 
-use crate::{Gpu, GpuError, shader};
+use crate::{Gpu, GpuError, shader, sky::SkyOnDevice};
 use bindings::{Layouts, bind, pipeline, upload};
 use dispatch::{Pass, Workspace};
 use glam::Vec3;
@@ -50,6 +50,8 @@ pub(crate) const RAY_STACK: u32 = tree::STACK;
 pub(crate) const RAY_TURNS: u32 = 3_800;
 /// Turns of loops after which a pixel starts no further ray, so that few have to be suspended.
 const RAY_TURNS_FOR_NEW: u32 = 2_400;
+/// Turns that looking up a sample of a sky takes at most: two searches among 2¹⁴.
+const SKY_TURNS: u32 = 30;
 /// Unit round-off of `f32`.
 const ROUND_OFF: f32 = f32::EPSILON * 0.5;
 /// Padding of node boxes, in multiples of the distance of the scene's farthest corner: twice that of the scene's own
@@ -66,8 +68,12 @@ pub(crate) fn constants() -> String {
         ("LIGHT_SEED_HIGH", (LIGHT_SEED >> 32) as u32),
         ("VSL_SEED", VSL_SEED),
     ];
-    let turns =
-        [("RAY_STACK", RAY_STACK), ("RAY_TURNS", RAY_TURNS), ("RAY_TURNS_FOR_NEW", RAY_TURNS_FOR_NEW)];
+    let turns = [
+        ("RAY_STACK", RAY_STACK),
+        ("RAY_TURNS", RAY_TURNS),
+        ("RAY_TURNS_FOR_NEW", RAY_TURNS_FOR_NEW),
+        ("SKY_TURNS", SKY_TURNS),
+    ];
     for (name, value) in seeds.into_iter().chain(turns) {
         text.push_str(&format!("const {name}: u32 = {value}u;\n"));
     }
@@ -111,6 +117,8 @@ pub(crate) struct RayInputs<'a> {
     pub(crate) lights: &'a wgpu::Buffer,
     /// Polygons of the virtual surface lights; whatever there is for direct light.
     pub(crate) patches: &'a wgpu::Buffer,
+    /// The sky among the lights, or none.
+    pub(crate) sky: &'a SkyOnDevice,
     /// Number of lights, as in the uniforms.
     pub(crate) count: u32,
     /// Number of the camera sample, from 0: each has other samples of lights.
@@ -278,13 +286,15 @@ impl Rays {
         bind(
             gpu,
             &self.layouts.inputs[0],
-            &[0, 1, 2, 3, 4],
+            &[0, 1, 2, 3, 4, 5, 6],
             [
                 inputs.frame.as_entire_binding(),
                 wgpu::BindingResource::TextureView(inputs.gbuffer),
                 inputs.lights.as_entire_binding(),
                 wgpu::BindingResource::TextureView(inputs.output),
                 inputs.patches.as_entire_binding(),
+                inputs.sky.numbers.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&inputs.sky.map),
             ],
         )
     }

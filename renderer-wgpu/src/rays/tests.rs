@@ -32,6 +32,7 @@ fn config(name: &str) -> Scene {
 struct Picture {
     gpu: Gpu,
     rays: Rays,
+    sky: SkyOnDevice,
     frame: FrameUniform,
     frame_buffer: wgpu::Buffer,
     gbuffer: Target,
@@ -87,10 +88,12 @@ impl Picture {
         let usage = TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC;
         let mut rays = Rays::new(gpu);
         rays.set_geometry(gpu, &scene.geometry).unwrap();
+        let mut sky = SkyOnDevice::new(gpu);
+        sky.update(gpu, &scene.lights).unwrap();
         let bytes = size_of::<FrameUniform>() as u64;
         let frame_buffer = buffer(gpu, "frame", bytes, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let output = Target::new(gpu, "irradiance", size, HDR, usage);
-        Self { gpu: gpu.clone(), rays, frame, frame_buffer, gbuffer, output }
+        Self { gpu: gpu.clone(), rays, sky, frame, frame_buffer, gbuffer, output }
     }
 
     fn direct(&mut self, scene: &Scene, light_samples: u32) -> (Vec<Vec3>, Traced) {
@@ -157,6 +160,7 @@ impl Picture {
             size: self.frame.size,
             lights,
             patches: &patches,
+            sky: &self.sky,
             count,
             sample,
             output: &self.output.view,

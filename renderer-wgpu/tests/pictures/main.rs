@@ -8,6 +8,7 @@ mod edited;
 mod extremes;
 mod only_what_changed;
 mod scenes;
+mod sky;
 mod textured;
 mod twin_distance_map;
 mod twin_texture;

@@ -3,6 +3,7 @@
 use crate::WindowError;
 use glam::{DVec3, Vec3};
 use photonstream_protocol::{ChannelName, ControlClient, ProtocolError, Reply, Request};
+use photonstream_shading::LightShape;
 use serde_json::{Map, Value, json};
 use std::{
     collections::VecDeque,
@@ -109,9 +110,13 @@ pub(crate) fn place_light(name: &str, position_m: DVec3) -> Request {
     Request::SetLight { name: name.into(), values: value("position_m", place(position_m)) }
 }
 
-/// Gives a light another power: W, or W/m² for parallel light.
-pub(crate) fn power_light(name: &str, power: Vec3, is_parallel: bool) -> Request {
-    let key = if is_parallel { "irradiance_w_m2" } else { "power_w" };
+/// Gives a light another power: W, W/m² for parallel light, or for a sky the mean radiance in W/(m² sr).
+pub(crate) fn power_light(name: &str, power: Vec3, shape: &LightShape) -> Request {
+    let (key, power) = match shape {
+        LightShape::Directional { .. } => ("irradiance_w_m2", power),
+        LightShape::Sky { sky } => ("scale", sky.scale_of(power)),
+        _ => ("power_w", power),
+    };
     // Six digits, so that messages and files read 12.5 and not 12.499999046325684.
     let digits = |p: f32| format!("{p:.5e}").parse::<f64>().unwrap_or(0.0);
     Request::SetLight { name: name.into(), values: value(key, json!(power.to_array().map(digits))) }
@@ -197,7 +202,11 @@ mod tests {
             queue.push(switch_light("ball", i % 2 == 0));
         }
         queue.push(Request::Pause);
-        queue.push(power_light("ball", Vec3::new(0.1, 12.5, 3e-7), false));
+        queue.push(power_light(
+            "ball",
+            Vec3::new(0.1, 12.5, 3e-7),
+            &LightShape::Point { position: Vec3::ZERO },
+        ));
         queue.push(place_of("box", 1.0));
         queue.push(Request::Step);
         queue.push(Request::Step);

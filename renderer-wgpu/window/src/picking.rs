@@ -73,11 +73,12 @@ impl Eye<'_> {
     }
 }
 
-/// Where a light is taken hold of: where it stands, or the middle of its surface; `None` for parallel light.
+/// Where a light is taken hold of: where it stands, or the middle of its surface; `None` for light from
+/// infinitely far away.
 pub(crate) fn anchor(light: &Light) -> Option<Vec3> {
     match light.shape {
         LightShape::Point { position } | LightShape::Spot { position, .. } => Some(position),
-        LightShape::Directional { .. } => None,
+        LightShape::Directional { .. } | LightShape::Sky { .. } => None,
         LightShape::Parallelogram { corner, edge_u, edge_v } => Some(corner + 0.5 * (edge_u + edge_v)),
         LightShape::Triangle { corner, edge_u, edge_v } => Some(corner + (edge_u + edge_v) / 3.0),
     }

@@ -56,7 +56,7 @@ fn moved_objects_are_followed_and_nothing_else_is_built_anew() {
     assert!(Arc::ptr_eq(&unmoved.geometry, &first.geometry) && parts(unmoved) == parts(&first));
     let followed = published.update(&frame(&moved)).unwrap().clone();
     assert_eq!((&followed.geometry, &followed.objects), (&moved.geometry, &moved.objects));
-    assert_eq!((followed.bounds, followed.lights[0].light), (moved.bounds, moved.lights[0].light));
+    assert_eq!((followed.bounds, &followed.lights[0].light), (moved.bounds, &moved.lights[0].light));
     let floor = still.object("floor").unwrap().0 as usize;
     for (index, (a, b)) in parts(&followed).into_iter().zip(parts(&first)).enumerate() {
         assert_eq!(a == b, index == floor, "part {index}");
@@ -181,6 +181,24 @@ fn bad_reflectances_are_named_and_change_nothing() {
     }
 }
 
+const LOADED: LightShape = LightShape::Point { position: Vec3::ZERO };
+
+/// A record brings a sky's strength, the text its radiances; where the text has none the record is refused.
+#[test]
+fn a_sky_keeps_its_radiances_and_takes_its_strength() {
+    let sky = std::sync::Arc::new(photonstream_shading::Sky::gradient(
+        glam::DVec3::ONE,
+        glam::DVec3::ZERO,
+        glam::DVec3::X,
+    ));
+    let loaded = LightShape::Sky { sky };
+    let record = LightRecord { kind: 5, enabled: 1, power: [1.0, 2.0, 3.0], ..LightRecord::default() };
+    let made = light(3, &record, &loaded).unwrap();
+    assert_eq!((&made.shape, made.power), (&loaded, Vec3::new(1.0, 2.0, 3.0)));
+    let error = light(3, &record, &LOADED).unwrap_err().to_string();
+    assert!(error.starts_with("light 3: kind: found 5, a sky"), "{error}");
+}
+
 #[test]
 fn lights_become_their_shapes_and_bad_ones_are_named() {
     let spot = LightRecord {
@@ -192,18 +210,19 @@ fn lights_become_their_shapes_and_bad_ones_are_named() {
         versine_outer: 0.2,
         ..LightRecord::default()
     };
-    let made = light(0, &spot).unwrap();
+    let made = light(0, &spot, &LOADED).unwrap();
     assert_eq!(made.power, Vec3::new(1.0, 2.0, 3.0));
     assert!(matches!(made.shape, LightShape::Spot { versine_outer: 0.2, .. }));
-    assert_eq!(light(0, &LightRecord { enabled: 0, ..spot }).unwrap().power, Vec3::ZERO);
+    assert_eq!(light(0, &LightRecord { enabled: 0, ..spot }, &LOADED).unwrap().power, Vec3::ZERO);
     for (bad, field) in [
         (LightRecord { kind: 9, ..spot }, "kind"),
+        (LightRecord { kind: 5, ..spot }, "kind"),
         (LightRecord { direction: [0.0; 3], ..spot }, "direction"),
         (LightRecord { versine_outer: 0.05, ..spot }, "versine_inner, versine_outer"),
         (LightRecord { power: [-1.0, 0.0, 0.0], ..spot }, "power"),
         (LightRecord { position: [f32::NAN; 3], ..spot }, "position"),
     ] {
-        let error = light(7, &bad).unwrap_err().to_string();
+        let error = light(7, &bad, &LOADED).unwrap_err().to_string();
         assert!(error.starts_with(&format!("light 7: {field}: found")), "{error}");
     }
 }

@@ -87,6 +87,11 @@ fn write_light(property: AnimatedProperty, value: DVec3, light: &mut LightConfig
             _ => {}
         }
     }
+    if let Some(sky) = &mut light.sky
+        && property == AnimatedProperty::Scale
+    {
+        sky.scale = Some(OneOrThree(value.to_array()));
+    }
     if let Some(shape) = &mut light.rectangle {
         write_placement(property, value, (&mut shape.position_m, &mut shape.rotation_deg, &mut shape.scale));
     }

@@ -36,6 +36,7 @@ enum Kind {
     Spot,
     Point,
     Directional,
+    Sky,
 }
 
 /// Common multiples of periods are looked for up to so many times the longest of them.
@@ -87,7 +88,8 @@ impl Animation {
     pub(crate) fn moving(&self, objects: &[Object], lights: &[SceneLight]) -> (u32, u32) {
         let moves = |target: &Target, surface: bool| {
             target.tracks.iter().any(|(property, _)| {
-                let dims = matches!(property, AnimatedProperty::Power | AnimatedProperty::Irradiance);
+                let dims = matches!(property, AnimatedProperty::Power | AnimatedProperty::Irradiance)
+                    || target.kind == Kind::Sky;
                 !dims && target.kind.moves_surface(*property) == surface
             })
         };
@@ -137,6 +139,7 @@ impl Kind {
             Self::Spot => &[Power, Position, Target, Direction],
             Self::Point => &[Power, Position],
             Self::Directional => &[Irradiance, Direction],
+            Self::Sky => &[Scale],
         }
     }
 }

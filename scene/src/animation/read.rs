@@ -33,7 +33,7 @@ pub(crate) fn read(config: &mut SceneConfig, root: &Field<'_>) -> Result<Animati
         let (kind, name) = target(table, config, &field)?;
         let property = property(table, kind, &field)?;
         let repeat = *table.repeat.get_or_insert_default();
-        let track = Track { path: path(table, property, &field)?, repeat };
+        let track = Track { path: path(table, kind, property, &field)?, repeat };
         let target = targets.entry((kind == Kind::Object, name.clone())).or_insert_with(|| Target {
             kind,
             name,
@@ -77,6 +77,7 @@ fn target(
                 LightConfig { spot: Some(_), .. } => Kind::Spot,
                 LightConfig { directional: Some(_), .. } => Kind::Directional,
                 LightConfig { rectangle: Some(_), .. } => Kind::Rectangle,
+                LightConfig { sky: Some(_), .. } => Kind::Sky,
                 _ => Kind::Point,
             };
             Ok((kind, name.clone()))
@@ -103,6 +104,7 @@ fn property(table: &AnimationConfig, kind: Kind, field: &Field<'_>) -> Result<An
         Kind::Spot => "a spot",
         Kind::Point => "a point light",
         Kind::Directional => "a directional light",
+        Kind::Sky => "a sky",
     };
     Err(field.key("property").invalid(
         format!("\"{}\"", property.name()),
@@ -127,6 +129,7 @@ fn check_single(target: &Target, property: AnimatedProperty, field: &Field<'_>) 
 
 fn path(
     table: &mut AnimationConfig,
+    kind: Kind,
     property: AnimatedProperty,
     field: &Field<'_>,
 ) -> Result<Path, SceneError> {
@@ -135,7 +138,12 @@ fn path(
     match (&table.times_s, &mut table.values, &mut table.orbit) {
         (Some(times), Some(values), None) => {
             let interpolation = *table.interpolation.get_or_insert_default();
-            keyframes(times, values, interpolation, property, field)
+            // The scale of a sky is a strength: none is the factor 0.
+            let as_read = match (kind, property) {
+                (Kind::Sky, AnimatedProperty::Scale) => AnimatedProperty::Power,
+                _ => property,
+            };
+            keyframes(times, values, interpolation, as_read, field)
         }
         (None, None, Some(orbit)) => {
             if table.interpolation.is_some() {

@@ -1,35 +1,37 @@
 //! Turns `[light.NAME]` tables into lights, and area lights into objects that show them.
 
-use super::{Inputs, check_name, materials::Materials};
+use super::{Inputs, check_name, materials::Materials, sky};
 use crate::{
     bake::{Emitter, EmitterFace, Part, Strength},
     config::{
         DirectionalConfig, Field, LightConfig, OneOrThree, PointConfig, RectangleConfig, SpotConfig, Vector,
     },
     error::SceneError,
+    import::AssetRoots,
     placement::Placement,
     primitives::quad,
     scene::Sides,
 };
 use glam::DVec3;
-use photonstream_shading::{Light, LightShape};
-use std::collections::BTreeMap;
+use photonstream_shading::{Light, LightShape, Sky};
+use std::{collections::BTreeMap, sync::Arc};
 
 /// Smallest half angle of a spot: below, f32 directions in the cone are too few to tell apart.
 const MIN_HALF_ANGLE_DEG: f64 = 0.01;
 
 /// A light without a surface, in the config's coordinates.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct PlainLight {
-    power: DVec3,
-    shape: PlainShape,
+    pub(super) power: DVec3,
+    pub(super) shape: PlainShape,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum PlainShape {
+#[derive(Clone, Debug)]
+pub(super) enum PlainShape {
     Point { position: DVec3 },
     Spot { position: DVec3, direction: DVec3, inner_deg: f64, outer_deg: f64 },
     Directional { direction: DVec3 },
+    Sky(Arc<Sky>),
 }
 
 impl PlainLight {
@@ -46,6 +48,7 @@ impl PlainLight {
             PlainShape::Directional { direction } => {
                 LightShape::Directional { direction: direction.as_vec3().normalize() }
             }
+            PlainShape::Sky(sky) => LightShape::Sky { sky },
         };
         Light { shape, power: self.power.as_vec3() }
     }
@@ -59,12 +62,28 @@ fn versine(degrees: f64) -> f32 {
 pub(super) fn read<'a>(
     table: &mut BTreeMap<String, LightConfig>,
     field: &Field<'a>,
+    roots: &AssetRoots,
     materials: &mut Materials,
     inputs: &mut Inputs<'a>,
 ) -> Result<(), SceneError> {
+    let mut sky_name: Option<&str> = None;
     for (name, light) in table {
         let field = field.key(name);
         check_name(name, &field)?;
+        if light.sky.is_some() {
+            if let Some(other) = sky_name.replace(name) {
+                let found = format!("a second sky besides \"{other}\"");
+                return Err(field.key("sky").invalid(
+                    found,
+                    "one sky in a scene",
+                    "join them, or leave one out",
+                ));
+            }
+            let sky = sky::read(light, &field, roots, inputs)?;
+            inputs.lights.insert(name.clone(), sky);
+            inputs.written.insert(name.clone(), light.clone());
+            continue;
+        }
         let Some(plain) = read_plain(light, &field)? else {
             let LightConfig { power_w, irradiance_w_m2, rectangle, .. } = light;
             let rectangle = rectangle.as_mut().expect("invariant: a light that is not plain is a rectangle");
@@ -86,7 +105,7 @@ pub(super) fn read<'a>(
     Ok(())
 }
 
-/// A light without a surface; `None` for a rectangle. Fills in the defaults.
+/// A light without a surface, but a sky; `None` for a rectangle. Fills in the defaults.
 ///
 /// # Errors
 /// If it has not exactly one shape, or a value is not valid.
@@ -94,7 +113,7 @@ pub(crate) fn read_plain(
     light: &mut LightConfig,
     field: &Field<'_>,
 ) -> Result<Option<PlainLight>, SceneError> {
-    let LightConfig { power_w, irradiance_w_m2, spot, point, directional, rectangle } = light;
+    let LightConfig { power_w, irradiance_w_m2, spot, point, directional, rectangle, sky: _ } = light;
     let shape = match (spot, point, directional, rectangle) {
         (Some(spot), None, None, None) => read_spot(spot, &field.key("spot"))?,
         (None, Some(point), None, None) => read_point(point, &field.key("point"))?,
@@ -106,6 +125,7 @@ pub(crate) fn read_plain(
                 ("point", point.is_some()),
                 ("directional", directional.is_some()),
                 ("rectangle", rectangle.is_some()),
+                ("sky", false),
             ];
             return Err(not_one_of(field, &given));
         }

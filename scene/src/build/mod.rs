@@ -7,6 +7,7 @@ pub(crate) mod lights;
 mod materials;
 mod objects;
 mod settings;
+pub(crate) mod sky;
 mod steady_state;
 
 use crate::{
@@ -78,6 +79,7 @@ impl SceneConfig {
             lights: BTreeMap::new(),
             written: BTreeMap::new(),
             contents: BTreeMap::new(),
+            sky_content: None,
             files: Vec::new(),
         };
         let mut notices = Vec::new();
@@ -89,7 +91,7 @@ impl SceneConfig {
             &mut inputs,
             &mut notices,
         )?;
-        lights::read(&mut self.light, &root.key("light"), &mut materials, &mut inputs)?;
+        lights::read(&mut self.light, &root.key("light"), roots, &mut materials, &mut inputs)?;
         let parts: Vec<Part<'_>> = inputs.parts.into_values().collect();
         if parts.is_empty() {
             return Err(root.invalid("no object", "at least one", "add an [object.NAME] with a shape"));
@@ -110,10 +112,11 @@ impl SceneConfig {
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
         let mut bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
         bvh.set_holes(Holes::find(&geometry, &objects, &materials));
+        let sky = lights.iter().position(|l| l.light.shape.sky().is_some()).map(|i| LightId(i as u32));
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
         notices.extend(steady_state::notice(&features, &objects, &materials));
-        let (resolved_text, hash) = resolve(&mut self, &inputs.contents);
+        let (resolved_text, hash) = resolve(&mut self, &inputs.contents, inputs.sky_content.as_ref());
         let mut scene = Scene {
             name,
             hash,
@@ -122,6 +125,7 @@ impl SceneConfig {
             materials,
             objects,
             lights,
+            sky,
             camera,
             streaming,
             render,
@@ -153,6 +157,8 @@ struct Inputs<'a> {
     written: BTreeMap<String, LightConfig>,
     /// Absolute path and hash of the asset of each importing object.
     contents: BTreeMap<String, (String, blake3::Hash)>,
+    /// The same of the map of the sky.
+    sky_content: Option<(String, blake3::Hash)>,
 }
 
 fn stem(document: &Document) -> String {
@@ -210,12 +216,20 @@ pub(crate) fn area_light(shape: LightShape, strength: Strength) -> Light {
 
 /// The resolved text with absolute asset paths, and the hash of the same text with the assets' content in their place:
 /// equal wherever the assets lie, different as soon as they differ.
-fn resolve(config: &mut SceneConfig, contents: &BTreeMap<String, (String, blake3::Hash)>) -> (Arc<str>, u64) {
+fn resolve(
+    config: &mut SceneConfig,
+    contents: &BTreeMap<String, (String, blake3::Hash)>,
+    sky_content: Option<&(String, blake3::Hash)>,
+) -> (Arc<str>, u64) {
     let mut text_with = |path_of: &dyn Fn(&(String, blake3::Hash)) -> String| {
         for (name, object) in &mut config.object {
             if let (Some(path), Some(content)) = (object.asset_path(), contents.get(name)) {
                 *path = path_of(content);
             }
+        }
+        let skies = config.light.values_mut().filter_map(|light| light.sky.as_mut()?.map.as_mut());
+        if let Some(content) = sky_content {
+            skies.for_each(|path| *path = path_of(content));
         }
         toml::to_string(config).expect("invariant: a validated config has only values that TOML can hold")
     };

@@ -67,6 +67,15 @@ fn every_key() -> SceneConfig {
             rotation_deg: Some(v),
             scale: c,
         }),
+        sky: Some(SkyConfig {
+            radiance_w_m2_sr: c,
+            zenith_w_m2_sr: c,
+            horizon_w_m2_sr: c,
+            ground_w_m2_sr: c,
+            map: Some("p".into()),
+            rotation_deg: Some(1.0),
+            scale: c,
+        }),
     };
     let animation = AnimationConfig {
         light: Some("l".into()),
@@ -169,6 +178,11 @@ fn documented_defaults_are_those_of_a_resolved_scene() {
         "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
         "buffers": [{ "byteLength": 36, "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
     std::fs::write(folder.path().join("a.gltf"), gltf).unwrap();
+    std::fs::write(
+        folder.path().join("a.hdr"),
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x80",
+    )
+    .unwrap();
     let text = r#"
         camera = { position_m = [0, 0, 5], target_m = [0, 0, 0], vertical_fov_deg = 40 }
         material.m.albedo = 0.5
@@ -183,6 +197,7 @@ fn documented_defaults_are_those_of_a_resolved_scene() {
         ]
         object.e = { material = "m", box = { size_m = [1, 1, 1] } }
         light.f = { power_w = 1, point = { position_m = [0, 1, 0] } }
+        light.s = { sky = { map = "a.hdr" } }
         light.d = { power_w = 1, rectangle = { corner_m = [0, 3, 0], edge_u_m = [1, 0, 0], edge_v_m = [0, 0, 1] } }
     "#;
     let config = SceneConfig::from_text(text, &folder.path().join("scene.toml")).unwrap();

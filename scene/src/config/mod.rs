@@ -7,12 +7,14 @@ mod domain;
 mod imports;
 #[cfg(test)]
 mod keys;
+mod sky;
 mod values;
 
 pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
 pub use domain::{MAX_LENGTH_M, MAX_POWER};
 pub use imports::{GltfConfig, ObjConfig, PlyConfig, UpAxis};
+pub use sky::SkyConfig;
 pub use values::{OneOrThree, Vector};
 
 use crate::{
@@ -179,6 +181,8 @@ pub struct LightConfig {
     pub directional: Option<DirectionalConfig>,
     /// A diffuse parallelogram; an object of the same name shows it.
     pub rectangle: Option<RectangleConfig>,
+    /// Light from infinitely far away in all directions; at most one in a scene.
+    pub sky: Option<SkyConfig>,
 }
 
 /// `spot`: a cone of light with a smooth edge. Exactly one of target and direction.

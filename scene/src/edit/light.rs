@@ -9,6 +9,7 @@ use crate::{
     build::{
         area_light,
         lights::{read_plain, read_power},
+        sky::read_scale,
     },
     config::{Document, Field, LightConfig, MAX_LENGTH_M, MAX_POWER, OneOrThree, Vector},
     error::SceneError,
@@ -31,6 +32,7 @@ const SPOT: &[&str] = &[
 const POINT: &[&str] = &["power_w", "enabled", "position_m"];
 const DIRECTIONAL: &[&str] = &["irradiance_w_m2", "enabled", "direction"];
 const AREA: &[&str] = &["power_w", "enabled"];
+const SKY: &[&str] = &["scale", "enabled"];
 
 pub(super) fn set(scene: &mut Scene, name: &str, values: &Values) -> Result<LightId, SceneError> {
     let document = Document::default();
@@ -69,6 +71,7 @@ fn edited(
         LightShape::Point { .. } => (Some("point"), POINT),
         LightShape::Directional { .. } => (Some("directional"), DIRECTIONAL),
         LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => (Some("rectangle"), AREA),
+        LightShape::Sky { .. } => (Some("sky"), SKY),
     };
     let mut keys = Keys::read(values, shape, valid, field)?;
     edited.enabled = keys.take("enabled", "true or false", field)?.unwrap_or(light.enabled);
@@ -77,7 +80,14 @@ fn edited(
         if let Some(power) = power {
             *strength = Strength::Power(read_power(Some(power), None, false, field)?);
         }
-        area_light(light.light.shape, *strength)
+        area_light(light.light.shape.clone(), *strength)
+    } else if let (Some(sky), Some(written)) =
+        (light.light.shape.sky(), edited.written.as_mut().and_then(|written| written.sky.as_mut()))
+    {
+        written.scale = keys.take("scale", ONE_OR_THREE, field)?.or(written.scale);
+        let scale = written.scale.unwrap_or(OneOrThree([1.0; 3]));
+        let power = read_scale(scale, &field.key("sky"))? * sky.mean().as_dvec3();
+        Light { shape: light.light.shape.clone(), power: power.as_vec3() }
     } else {
         let written =
             edited.written.as_mut().expect("invariant: lights without a surface come from a config");
@@ -138,10 +148,10 @@ pub(super) fn replace(scene: &mut Scene, id: LightId, light: Light) -> Result<()
         ));
     }
     check(&light, &field)?;
-    target.light = light;
     if let Some((_, strength)) = &mut target.face {
         *strength = Strength::Power(light.power.as_dvec3());
     }
+    target.light = light;
     Ok(())
 }
 
@@ -159,6 +169,7 @@ fn check(light: &Light, field: &Field<'_>) -> Result<(), SceneError> {
         LightShape::Directional { direction } => (&[], Some(*direction)),
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => (&[*corner, *edge_u, *edge_v], None),
+        LightShape::Sky { .. } => (&[], None),
     };
     for position in positions {
         if !(position.is_finite() && f64::from(position.abs().max_element()) <= MAX_LENGTH_M) {

@@ -8,6 +8,7 @@ mod obj;
 mod pictures;
 mod ply;
 mod polygons;
+mod sky_map;
 mod texture;
 
 pub use assets::AssetRoots;
@@ -16,6 +17,7 @@ pub(crate) use frame::Frame;
 pub(crate) use gltf::{FileCamera, gltf_cameras, load_gltf};
 pub(crate) use obj::{NO_MATERIAL, load_obj};
 pub(crate) use ply::read_ply;
+pub(crate) use sky_map::read_radiances;
 
 use crate::{bake::EmitterFace, picture::Texture, primitives::Mesh};
 use glam::DVec3;

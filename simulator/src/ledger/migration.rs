@@ -16,7 +16,6 @@ use crate::{
 };
 use glam::Vec3;
 use photonstream_scene::{Object, Scene};
-use photonstream_shading::LightShape;
 
 /// What the step from one scene to any other means for the paths of the old one.
 #[derive(Clone, Debug)]
@@ -50,10 +49,9 @@ impl Migration {
             .map(|(light, slots)| {
                 let index = before.light(&light.name)?.0 as usize;
                 let (old_light, old_slots) = (&before.lights[index], &old.emitters.lights[index]);
-                let is_sun = matches!(light.light.shape, LightShape::Directional { .. });
                 let count = |slots: &std::ops::Range<u32>| slots.end - slots.start;
                 let is_moved = old_light.light.shape != light.light.shape
-                    || (is_sun && before.bounds != after.bounds)
+                    || (light.light.shape.is_distant() && before.bounds != after.bounds)
                     // Of a stream later samples are numbered by the light's slots.
                     || (count(&old_slots.slots) != count(&slots.slots) && !matches!(after.streaming.sampling, photonstream_scene::Sampling::Replay));
                 let revision = LightRevision::of_slots(old_slots, slots, all_stale || is_moved);

@@ -10,6 +10,7 @@ mod reload;
 mod selective;
 mod service;
 mod service_edits;
+mod sky;
 mod split;
 mod support;
 mod textured;

@@ -65,7 +65,7 @@ fn channels_without_light_are_exactly_dark() {
         &text("[0.9, 0.9, 0.0]")
             .with_light(
                 photonstream_scene::LightId(0),
-                photonstream_shading::Light { power: Vec3::Z, ..text("0.9").lights[0].light },
+                photonstream_shading::Light { power: Vec3::Z, ..text("0.9").lights[0].light.clone() },
             )
             .map(Arc::new)
             .unwrap(),

@@ -150,7 +150,7 @@ fn moved(scene: &Scene, motion: DAffine3) -> Arc<Scene> {
     let point = |v: Vec3| motion.transform_point3(v.as_dvec3()).as_vec3();
     let vector = |v: Vec3| motion.transform_vector3(v.as_dvec3()).as_vec3();
     let lamp = &scene.lights[0];
-    let shape = match lamp.light.shape {
+    let shape = match lamp.light.shape.clone() {
         LightShape::Point { position } => LightShape::Point { position: point(position) },
         LightShape::Spot { position, direction, versine_inner, versine_outer } => LightShape::Spot {
             position: point(position),

@@ -92,25 +92,29 @@ fn light(ui: &mut Ui, name: &str, published: &Published, draft: &mut Draft, requ
     let scene = &published.scene;
     let Some(LightId(id)) = scene.light(name) else { return };
     let light = &scene.lights[id as usize];
-    let is_parallel = matches!(light.light.shape, LightShape::Directional { .. });
     ui.label(match light.light.shape {
         LightShape::Point { .. } => "point",
         LightShape::Spot { .. } => "spot",
         LightShape::Directional { .. } => "directional",
         LightShape::Parallelogram { .. } => "rectangle",
         LightShape::Triangle { .. } => "triangle",
+        LightShape::Sky { .. } => "sky",
     });
     if ui.checkbox(&mut draft.enabled, "on").changed() {
         requests.push(switch_light(name, draft.enabled));
     }
-    let unit = if is_parallel { " W/m²" } else { " W" };
+    let unit = match light.light.shape {
+        LightShape::Directional { .. } => " W/m²",
+        LightShape::Sky { .. } => " W/(m² sr)",
+        _ => " W",
+    };
     let power = power(ui, &mut draft.power, unit);
     let colour = ui.horizontal(|ui| {
         ui.label("colour");
         ui.color_edit_button_rgb(&mut draft.colour).changed()
     });
     if power || colour.inner {
-        requests.push(power_light(name, Vec3::from(draft.colour) * draft.power, is_parallel));
+        requests.push(power_light(name, Vec3::from(draft.colour) * draft.power, &light.light.shape));
     }
     match light.object {
         Some(object) => place(ui, published, object, draft, requests),

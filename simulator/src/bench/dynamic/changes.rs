@@ -31,9 +31,13 @@ fn recoloured_light(scene: &Scene) -> Option<(String, [Request; 2])> {
     let light = &scene.lights[brightest(scene)?.0 as usize];
     let key = match light.light.shape {
         LightShape::Directional { .. } => "irradiance_w_m2",
+        LightShape::Sky { .. } => "scale",
         _ => "power_w",
     };
-    let power = light.light.power;
+    let power = match light.light.shape.sky() {
+        Some(sky) => sky.scale_of(light.light.power),
+        None => light.light.power,
+    };
     let set = |power: Vec3| Request::SetLight {
         name: light.name.clone(),
         values: values(json!({ key: power.to_array() })),
@@ -53,7 +57,9 @@ fn moved_light(scene: &Scene) -> Option<(String, [Request; 2])> {
             let from = direction.as_dvec3();
             ("direction", from, from + DVec3::X * 0.1)
         }
-        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => return None,
+        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Sky { .. } => {
+            return None;
+        }
     };
     let set = |to: DVec3| Request::SetLight {
         name: light.name.clone(),
