@@ -106,7 +106,7 @@ fn spread(
 }
 
 fn read_map(
-    path: &str,
+    path: &mut String,
     rotation_deg: f64,
     field: &Field<'_>,
     roots: &AssetRoots,
@@ -126,6 +126,8 @@ fn read_map(
         return Err(wrong(format!("its {length} bytes are more than {MAX_BYTES}")));
     }
     let bytes = read_file(&file).map_err(&wrong)?;
+    // What is kept of the light is the same wherever its text was read.
+    path.clone_from(&absolute);
     inputs.sky_content = Some((absolute, blake3::hash(&bytes)));
     let map = read_radiances(&bytes).map_err(&wrong)?;
     inputs.files.push(file.clone());
