@@ -106,6 +106,9 @@ const QUICK_ERROR: ((u32, u32), u64) = ((24, 18), 16);
 /// Pictures of a quick run.
 const QUICK_SIZE: (u32, u32) = (80, 60);
 
+/// Takes how much of a scene is done, in [0, 1], and what is being done.
+type Part<'a> = &'a dyn Fn(f64, &str);
+
 impl PaperTables {
     /// Measures all tables.
     ///
@@ -151,7 +154,7 @@ impl PaperTables {
         paper: &PaperScene,
         options: &PaperOptions,
         device: &mut Offered<'_>,
-        (observer, part): (Observer<'_>, &dyn Fn(f64, &str)),
+        (observer, part): (Observer<'_>, Part<'_>),
     ) -> Result<(), EvaluateError> {
         part(0.0, "loading");
         let scene = Arc::new(paper.load()?);

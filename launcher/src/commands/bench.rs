@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
 /// The tables of the paper.
 fn paper(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let folder =
-        tempfile::tempdir().map_err(|e| LauncherError::io("create folder", &std::env::temp_dir(), e))?;
+        tempfile::tempdir().map_err(|e| LauncherError::io("create folder", std::env::temp_dir(), e))?;
     let options = PaperOptions {
         quick: args.quick,
         cache: args.cache.clone().or_else(user_cache).unwrap_or_else(|| folder.path().to_owned()),

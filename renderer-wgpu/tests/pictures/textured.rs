@@ -10,7 +10,7 @@ use photonstream_scene::Visibility;
 fn room(folder: &std::path::Path) -> Lit {
     let smooth = |x: u32, y: u32| [(x * 4) as u8, (y * 4) as u8, ((x ^ y) * 4) as u8, 255];
     let floor = image::RgbaImage::from_fn(64, 64, |x, y| image::Rgba(smooth(x, y)));
-    let hole = |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 0 { 0 } else { 255 };
+    let hole = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { 0 } else { 255 };
     let plate = image::RgbaImage::from_fn(12, 12, |x, y| image::Rgba([200, 100, 50, hole(x, y)]));
     floor.save(folder.join("floor.png")).unwrap();
     plate.save(folder.join("plate.png")).unwrap();
