@@ -30,7 +30,7 @@ fn a_nanowatt_beside_a_gigawatt() {
     figure("1 GW beside 1 nW", lit.total()[0] / 1e9 - 1.0, 5.0 * sigma);
     for (off, power) in [("lamp", 1e-9), ("small", 1e9)] {
         let id = both.light(off).unwrap();
-        let mut dark = both.lights[id.0 as usize].light;
+        let mut dark = both.lights[id.0 as usize].light.clone();
         dark.power = Vec3::ZERO;
         let one = Arc::new(both.with_light(id, dark).unwrap());
         let readings = lit.ledger.readings(&one);
