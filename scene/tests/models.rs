@@ -249,7 +249,7 @@ fn light_of_a_file_is_exposed_for() {
         ",{\"name\":\"lamp\",\"translation\":[0,3,2],\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}}}";
     let lights = ",\"extensionsUsed\":[\"KHR_lights_punctual\"],\
                   \"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"point\",\"intensity\":100}]}}";
-    let scene = folder.scene("lit.glb", glb(&quads, &nodes, lights));
+    let scene = folder.scene("lit.glb", glb(&quads, nodes, lights));
     assert_eq!(scene.lights.len(), 1);
     assert_eq!(choice(&scene, "light"), Some("what the file has: 1"));
     // 0.15 W sr⁻¹ at 3 to 4 m on albedo 0.5 is about 0.002 W m⁻² sr⁻¹: 6 stops to a middle grey of 0.15.

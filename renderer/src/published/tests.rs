@@ -186,11 +186,7 @@ const LOADED: LightShape = LightShape::Point { position: Vec3::ZERO };
 /// A record brings a sky's strength, the text its radiances; where the text has none the record is refused.
 #[test]
 fn a_sky_keeps_its_radiances_and_takes_its_strength() {
-    let sky = Arc::new(photonstream_shading::Sky::gradient(
-        DVec3::ONE,
-        DVec3::ZERO,
-        DVec3::X,
-    ));
+    let sky = Arc::new(photonstream_shading::Sky::gradient(DVec3::ONE, DVec3::ZERO, DVec3::X));
     let loaded = LightShape::Sky { sky };
     let record = LightRecord { kind: 5, enabled: 1, power: [1.0, 2.0, 3.0], ..LightRecord::default() };
     let made = light(3, &record, &loaded).unwrap();
