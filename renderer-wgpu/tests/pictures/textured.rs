@@ -31,8 +31,9 @@ fn room(folder: &std::path::Path) -> Lit {
 }
 
 /// The albedo is the same to 1 %: the rasteriser interpolates from corners on a grid of 1/256 pixel, where a pixel's colour
-/// changes by at most a few times as many 256ths; the direct and indirect light then too, where both see the same: shadow maps
-/// beside the exact rays cost pixels at the outlines of holes and shadows, at most 3 % of them. 160 × 120 pixels, 300 lights.
+/// changes by at most a few times as many 256ths; the indirect light then too, where both see the same surface, which are all but
+/// 3 % of the pixels: outlines of holes run through others. Of those 5 % may have another direct light: filtered shadow maps
+/// beside exact rays differ at the outlines of shadows. 160 × 120 pixels, 300 lights.
 #[test]
 fn textures_and_holes_are_the_cpus() {
     let folder = tempfile::tempdir().unwrap();

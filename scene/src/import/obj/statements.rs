@@ -1,6 +1,6 @@
 //! Turns the text of an OBJ file into positions, texture coordinates, and faces by group and material.
 //!
-//! Read here and not by tobj: that panics on some texture coordinates that do not exist.
+//! Read here and not by tobj: that checks the numbers of texture coordinates less strictly than those of positions.
 
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
