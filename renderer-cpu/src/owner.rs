@@ -55,6 +55,7 @@ mod tests {
             position,
             ray_origin: position,
             normal,
+            flat: normal,
             albedo: Vec3::ONE,
             emitted: Vec3::ZERO,
             object,

@@ -37,6 +37,11 @@ pub(crate) fn seen(light: &Emitter, patch: &Patch, d: Vec3, d_origin: Vec3, norm
     if light.inverse_normal.dot(d_origin) <= 0.0 {
         return Seen { transfer: 0.0, middle };
     }
+    // Nor in it: a receiver there that looks the same way is of that plane, and its shading normal may lean over it.
+    let height = light.inverse_normal.dot(d);
+    if height * height <= d.distance_squared(d_origin) && light.inverse_normal.dot(normal) < 0.0 {
+        return Seen { transfer: 0.0, middle };
+    }
     let mut corners = [Vec3::ZERO; MAX_CORNERS];
     let count = patch.corners().len();
     for (corner, offset) in corners.iter_mut().zip(patch.corners()) {
@@ -126,5 +131,37 @@ mod tests {
             let disc = sum(Kernel::Disc) / exact - 1.0;
             assert!(distance > 0.01 || disc.abs() > 0.33, "{distance}: {disc}");
         }
+    }
+
+    /// A receiver on a light, whose normal leans by 30°, gets nothing of it; one just before the light's plane and one that
+    /// stands on it do.
+    #[test]
+    fn a_light_does_not_shine_along_its_own_plane() {
+        let (position, normal, flux, area) = (Vec3::ZERO, Vec3::Y, Vec3::ONE, 1.0);
+        let mut record = PatchRecord { count: 4, area, ..PatchRecord::default() };
+        for (k, [x, z]) in [[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]].into_iter().enumerate() {
+            record.corners[3 * k..3 * k + 3].copy_from_slice(&[x, 0.0, z]);
+        }
+        let set = VslSet::new([Vsl { position, normal, flux, area, object: 0 }]).unwrap();
+        let set = set.with_patches(&[record]);
+        let light = Emitter {
+            position,
+            flux,
+            inverse_normal: -normal,
+            area_term: 0.0,
+            range_sq: f32::INFINITY,
+            bound: 0.0,
+            weight_slope: 0.0,
+            index: 0,
+        };
+        let patch = set.patch(0).unwrap();
+        let off = Vec3::Y * 1e-5;
+        let transfer = |place: Vec3, normal: Vec3| seen(&light, patch, -place, -place - off, normal).transfer;
+        let leaning = Vec3::new(0.5, 0.75f32.sqrt(), 0.0);
+        assert_eq!(transfer(Vec3::new(0.1, 0.0, 0.2), leaning), 0.0);
+        assert_eq!(transfer(Vec3::new(0.1, 1e-6, 0.2), leaning), 0.0);
+        // The plane fills what the leaning horizon shows of it: (1 - cos 30°)/2, and half of the sky where the normal lies in it.
+        assert!((transfer(Vec3::new(0.0, 1e-4, 0.0), leaning) - 0.067).abs() < 1e-3);
+        assert!((transfer(Vec3::ZERO, Vec3::X) - 0.5).abs() < 1e-3);
     }
 }

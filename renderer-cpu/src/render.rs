@@ -209,7 +209,7 @@ impl<'a> Frame<'a> {
     fn see(&self, pixel: (u32, u32), sample_index: u32) -> Option<Surface> {
         let camera = &self.scene.camera;
         let width = camera.pixel_width(self.options.height);
-        surface::first(self.scene, camera.position, self.direction(pixel, sample_index), width)
+        surface::seen(self.scene, camera.position, self.direction(pixel, sample_index), width)
     }
 
     /// Where camera sample `sample_index` of a pixel looks.

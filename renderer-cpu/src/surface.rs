@@ -14,8 +14,11 @@ pub(crate) struct Surface {
     pub(crate) position: Vec3,
     /// The same point moved off the surface towards the viewer: where rays leave.
     pub(crate) ray_origin: Vec3,
-    /// Unit normal of the visible side.
+    /// Unit normal of the visible side by which arriving light is weighed: the shading normal of what a camera sees, the
+    /// triangle's own elsewhere.
     pub(crate) normal: Vec3,
+    /// Unit normal of the visible side of the triangle itself.
+    pub(crate) flat: Vec3,
     /// Reflectance of the visible side; zero where that side is not modelled.
     pub(crate) albedo: Vec3,
     /// Radiance that the visible side emits, in W m⁻² sr⁻¹.
@@ -24,6 +27,17 @@ pub(crate) struct Surface {
     pub(crate) object: u32,
     /// Distance along the ray, in multiples of its direction.
     pub(crate) distance: f32,
+}
+
+/// What a camera sees along a ray, as [`first`] does, with its shading normal.
+#[inline]
+pub(crate) fn seen(scene: &Scene, origin: Vec3, direction: Vec3, pixel: f32) -> Option<Surface> {
+    let ray = Ray { origin, direction, t_max: f32::INFINITY };
+    let hit = scene.bvh.closest(&ray)?;
+    let surface = describe(scene, &hit, direction, pixel);
+    let front = scene.shading_normal(hit.triangle, [hit.u, hit.v]);
+    let normal = if surface.flat.dot(front) < 0.0 { -front } else { front };
+    Some(Surface { normal, ..surface })
 }
 
 /// The first surface along a ray of unlimited length, whose direction is a unit vector; `pixel` is the width of what its
@@ -56,6 +70,7 @@ fn describe(scene: &Scene, hit: &Hit, direction: Vec3, pixel: f32) -> Surface {
         position,
         ray_origin: surface::offset(vertices, position, normal),
         normal,
+        flat: normal,
         albedo,
         emitted: scene.emitted_radiance(id, side),
         object: id.0,

@@ -124,8 +124,16 @@ pub(crate) mod random {
         tile.fill(count, |i| {
             let (position, normal) = points[i];
             let (albedo, emitted) = (Vec3::ONE, Vec3::ZERO);
-            let surface =
-                Surface { position, ray_origin: position, normal, albedo, emitted, object: 0, distance: 1.0 };
+            let surface = Surface {
+                position,
+                ray_origin: position,
+                normal,
+                flat: normal,
+                albedo,
+                emitted,
+                object: 0,
+                distance: 1.0,
+            };
             is_there(i).then_some(surface)
         });
         tile

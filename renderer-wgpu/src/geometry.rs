@@ -2,10 +2,11 @@
 
 use crate::{
     Gpu, GpuError,
-    layout::{Corner, ObjectUniform},
+    layout::{Corner, NO_BEND, ObjectUniform},
 };
 use glam::Vec3;
 use photonstream_scene::{ObjectId, Scene, Side};
+use photonstream_shading::octahedral;
 use std::{ops::Range, sync::Arc};
 use wgpu::BufferUsages;
 
@@ -84,7 +85,8 @@ impl Geometry {
         }
         if !Arc::ptr_eq(&self.source, &scene.geometry) && *self.source != *scene.geometry {
             changed.shape = true;
-            let same_layout = self.count as usize == scene.geometry.triangles.len() * 3
+            let same_layout = self.source.own_normals == scene.geometry.own_normals
+                && self.count as usize == scene.geometry.triangles.len() * 3
                 && self.parts.len() == scene.objects.len()
                 && self
                     .parts
@@ -179,9 +181,26 @@ fn corners_of(scene: &Scene, triangles: Range<u32>) -> Vec<Corner> {
     let corners = triangles.flat_map(|t| {
         let normal = geometry.normals[t as usize].to_array();
         let object = geometry.object_of[t as usize].0;
-        geometry.triangle(t).map(|v| Corner { position: v.to_array(), normal, object })
+        let bent = scene.corner_normals(t).map_or([NO_BEND; 3], |normals| normals.map(folded));
+        let [a, b, c] = geometry.triangle(t).map(|v| v.to_array());
+        [(a, bent[0]), (b, bent[1]), (c, bent[2])].map(|(position, bent)| Corner {
+            position,
+            normal,
+            object,
+            bent,
+        })
     });
     corners.collect()
+}
+
+/// A unit vector as two 16-bit numbers; what `unpack2x16snorm` reads.
+fn folded(normal: Vec3) -> u32 {
+    if normal == Vec3::ZERO {
+        return NO_BEND;
+    }
+    let [x, y] =
+        (octahedral::encode(normal) * f32::from(i16::MAX)).round().to_array().map(|n| n as i16 as u16);
+    u32::from(x) | u32::from(y) << 16
 }
 
 fn moved(

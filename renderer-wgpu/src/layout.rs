@@ -75,6 +75,7 @@ pub(crate) fn constants() -> String {
     unsigned("MAP_SEED", MAP_SEED);
     unsigned("ALL_LIGHTS", ALL_LIGHTS);
     unsigned("NO_OWNER", NO_OWNER);
+    unsigned("NO_BEND", NO_BEND);
     for (name, shown) in Shown::NAMES {
         unsigned(&format!("SHOW_{name}"), shown as u32);
     }
@@ -280,11 +281,16 @@ pub(crate) struct Corner {
     pub(crate) position: [f32; 3],
     pub(crate) normal: [f32; 3],
     pub(crate) object: u32,
+    /// The shading normal, folded onto a square of 16-bit numbers; [`NO_BEND`] in flat triangles.
+    pub(crate) bent: u32,
 }
 
+/// Means: no shading normal. Numbers that are packed never are -32 768.
+pub(crate) const NO_BEND: u32 = 0x8000_8000;
+
 impl Corner {
-    pub(crate) const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
-        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32];
+    pub(crate) const ATTRIBUTES: [wgpu::VertexAttribute; 4] =
+        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32, 5 => Uint32];
 
     pub(crate) fn layout() -> wgpu::VertexBufferLayout<'static> {
         wgpu::VertexBufferLayout {

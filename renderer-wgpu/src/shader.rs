@@ -12,6 +12,7 @@ pub(crate) struct Source {
 
 const FRAME: &str = include_str!("../wgsl/frame.wgsl");
 const PROJECTION: &str = include_str!("../wgsl/projection.wgsl");
+const CORNER: &str = include_str!("../wgsl/corner.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
 const VSL_PATCH: &str = include_str!("../wgsl/vsl_patch.wgsl");
 const VSL_MAP: &str = include_str!("../wgsl/vsl_map.wgsl");
@@ -37,8 +38,10 @@ macro_rules! sources {
 }
 
 sources! {
-    GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION];
-    GBUFFER_TEXTURED = "gbuffer_textured" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, PROJECTION, wgsl::TEXTURE];
+    GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, FRAME, PROJECTION, CORNER];
+    GBUFFER_TEXTURED = "gbuffer_textured" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::TEXTURE, FRAME, PROJECTION, CORNER
+    ];
     SHADOW_MAP = "shadow_map" [];
     SHADOW_MAP_HOLES = "shadow_map_holes" [wgsl::TEXTURE];
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
@@ -51,7 +54,7 @@ sources! {
         wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP
     ];
     FORWARD = "forward" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, CORNER, VSL, VSL_PATCH, VSL_MAP
     ];
     INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];

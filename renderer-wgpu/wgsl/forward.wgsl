@@ -15,18 +15,25 @@ struct Corner {
     @location(0) @interpolate(flat, either) anchor: vec3f,
     @location(1) @interpolate(flat, either) normal: vec3f,
     @location(2) @interpolate(flat, either) light: u32,
+    @location(3) bent: vec3f,
 }
 
 @vertex
-fn corner(@location(0) position: vec3f, @location(1) normal: vec3f, @builtin(instance_index) light: u32) -> Corner {
-    return Corner(clip_from_world(position), position, normal, light);
+fn corner(
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(5) bent: u32,
+    @builtin(instance_index) light: u32,
+) -> Corner {
+    return Corner(clip_from_world(position), position, normal, light, corner_bent(bent));
 }
 
 @fragment
 fn add(in: Corner) -> @location(0) vec4f {
     let direction = pixel_ray(vec2u(in.clip.xy));
     let position = frame.camera.position + direction * plane_distance(in.anchor, in.normal, direction);
-    let normal = select(-in.normal, in.normal, dot(in.normal, direction) < 0.0);
+    let bent = shading_normal(in.normal, in.bent);
+    let normal = select(-bent, bent, dot(in.normal, direction) < 0.0);
     let origin = position + (normal - direction) * (frame.magnitude * RELATIVE_OFFSET);
     return vec4f(vsl_arriving(batch.lights[in.light], numbers.first + in.light, position, origin, normal), 0.0);
 }

@@ -11,6 +11,7 @@ struct Corner {
     @location(2) @interpolate(flat, either) object: u32,
     @location(3) uv: vec2f,
     @location(4) @interpolate(flat, either) density: f32,
+    @location(5) bent: vec3f,
 }
 
 struct Seen {
@@ -25,13 +26,15 @@ fn corner(
     @location(2) object: u32,
     @location(3) uv: vec2f,
     @location(4) density: f32,
+    @location(5) bent: u32,
 ) -> Corner {
-    return Corner(clip_from_world(position), position, normal, object, uv, density);
+    return Corner(clip_from_world(position), position, normal, object, uv, density, corner_bent(bent));
 }
 
 @fragment
 fn surface(in: Corner) -> Seen {
     let direction = pixel_ray(vec2u(in.clip.xy));
+    let normal = shading_normal(in.normal, in.bent);
     let slope = dot(in.normal, direction);
     let front = slope < 0.0;
     let distance = plane_distance(in.anchor, in.normal, direction);
@@ -45,6 +48,6 @@ fn surface(in: Corner) -> Seen {
         let width = texture_footprint(pixel, distance, abs(slope));
         colour = texture_sample(picture, in.uv, texture_level_of_width(in.density, width)).rgb;
     }
-    let word = surface_pack(distance, select(-in.normal, in.normal, front), in.object, front);
+    let word = surface_pack(distance, select(-normal, normal, front), in.object, front);
     return Seen(word, vec4u(bitcast<vec3u>(colour), 0u));
 }

@@ -5,6 +5,7 @@ struct MapCorner {
     position: array<f32, 3>,
     normal: array<f32, 3>,
     object: u32,
+    bent: u32,
 }
 
 fn map_corner(index: u32) -> vec3f {

@@ -23,6 +23,12 @@ fn vsl_transfer(light: Vsl, index: u32, position: vec3f, origin: vec3f, normal: 
         if dot(light.normal, from_origin) >= 0.0 {
             return 0.0;
         }
+        // Of the light's own plane, which a shading normal may lean over.
+        let moved = d - from_origin;
+        let height = dot(light.normal, d);
+        if height * height <= dot(moved, moved) && dot(light.normal, normal) > 0.0 {
+            return 0.0;
+        }
         let count = patches[index].count;
         for (var i = 0u; i < count; i++) {
             let place = 3u * i;

@@ -5,7 +5,7 @@ use crate::{
     error::SceneError,
     placement::Placement,
     pose::{self, Pose, RestMesh},
-    primitives::Mesh,
+    primitives::{Mesh, extend},
     scene::{Geometry, Material, MaterialId, Object, ObjectId, Sides},
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -132,6 +132,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
                 soup.vertices.truncate(first_vertex);
                 soup.rest_vertices.truncate(first_vertex);
                 soup.uvs.truncate(first_vertex);
+                soup.own_normals.truncate(first_vertex);
                 notices.push(format!("object \"{}\": no triangle has an area; it was left out", part.name));
                 continue;
             }
@@ -160,6 +161,7 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             sides: part.sides,
             triangles: first_triangle..last_triangle,
             world_from_rest: pose.world_from_rest(rest.centre(pose.scale)),
+            world_from_own_normal: pose.world_from_own_normal(),
             transport_level: 0,
             emitter: None,
         });
@@ -182,6 +184,7 @@ struct Soup {
     vertices: Vec<Vec3>,
     rest_vertices: Vec<Vec3>,
     uvs: Vec<Vec2>,
+    own_normals: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     normals: Vec<Vec3>,
     object_of: Vec<ObjectId>,
@@ -208,11 +211,8 @@ impl Soup {
             self.vertices.push(pose::round(world));
             self.rest_vertices.push(RestMesh::rest_vertex(point, pose.scale, centre));
         }
-        if !part.mesh.uvs.is_empty() {
-            self.uvs.resize(first as usize, Vec2::ZERO);
-            self.uvs.extend_from_slice(&part.mesh.uvs);
-            self.uvs.resize(self.vertices.len(), Vec2::ZERO);
-        }
+        extend(&mut self.uvs, &part.mesh.uvs, first as usize..self.vertices.len());
+        extend(&mut self.own_normals, &part.mesh.normals, first as usize..self.vertices.len());
         Ok(mesh)
     }
 
@@ -234,14 +234,12 @@ impl Soup {
         dropped
     }
 
-    fn into_geometry(mut self) -> Geometry {
-        if !self.uvs.is_empty() {
-            self.uvs.resize(self.vertices.len(), Vec2::ZERO);
-        }
+    fn into_geometry(self) -> Geometry {
         Geometry {
             vertices: self.vertices,
             rest_vertices: self.rest_vertices.into(),
             uvs: self.uvs.into(),
+            own_normals: self.own_normals.into(),
             triangles: self.triangles.into(),
             normals: self.normals,
             object_of: self.object_of.into(),

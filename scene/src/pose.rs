@@ -4,7 +4,7 @@ use crate::{
     bake::{EmitterFace, snapped_centre},
     placement::Placement,
 };
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
 use photonstream_shading::LightShape;
 use std::ops::Range;
 
@@ -52,6 +52,13 @@ impl Pose {
     /// neighbouring quads share their edges without a gap.
     pub(crate) fn apply(&self, own: DVec3) -> DVec3 {
         self.rotation * (self.scale * own) + self.offset
+    }
+
+    /// The map of normals to the scene's space; their lengths are lost.
+    pub(crate) fn world_from_own_normal(&self) -> Mat3 {
+        // Near 1, whatever the size.
+        let shrinkage = self.scale.abs().max_element() / self.scale;
+        (self.rotation * DMat3::from_diagonal(shrinkage)).as_mat3()
     }
 
     /// The motion from the rest space around `centre`.

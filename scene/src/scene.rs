@@ -10,8 +10,8 @@ use crate::{
     pose::{Pose, RestMesh},
     settings::{RenderSettings, StreamingSettings},
 };
-use glam::{DAffine3, DVec3, Vec2, Vec3};
-use photonstream_shading::{Camera, Light, light::Bounds};
+use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
+use photonstream_shading::{Camera, Light, light::Bounds, surface};
 use std::{ops::Range, sync::Arc};
 
 /// Index of an object in [`Scene::objects`].
@@ -148,6 +148,9 @@ pub struct Object {
     pub triangles: Range<u32>,
     /// Rigid motion from rest space (the object at its final size, neither turned nor moved) to the scene's space.
     pub world_from_rest: DAffine3,
+    /// Leads from normals in the object's own coordinates to such in the scene's space, not of unit length: the inverse
+    /// transpose of its scale, rotation and shift.
+    pub world_from_own_normal: Mat3,
     /// The light whose radiance its front emits, for emitters; an imported emitter may be several lights of equal
     /// radiance, of which this is the first.
     pub emitter: Option<LightId>,
@@ -182,6 +185,9 @@ pub struct Geometry {
     pub rest_vertices: Arc<[Vec3]>,
     /// Texture coordinates of the vertices, rows counted from the top; none at all where nothing has a texture.
     pub uvs: Arc<[Vec2]>,
+    /// Unit shading normals of the vertices in the own coordinates of their object, zero where one has none; none at all in
+    /// a scene of flat surfaces. [`Object::world_from_own_normal`] leads to the scene's space.
+    pub own_normals: Arc<[Vec3]>,
     /// Vertex indices, counter-clockwise seen from the front; those of one object are contiguous.
     pub triangles: Arc<[[u32; 3]]>,
     /// Unit geometric normal of the front of each triangle, in the scene's space.
@@ -212,6 +218,32 @@ impl Geometry {
             return None;
         }
         Some(self.triangles[id as usize].map(|v| self.uvs[v as usize]))
+    }
+}
+
+impl Scene {
+    /// The shading normals of the corners of triangle `id`, front side, unit, in the scene's space; `None` for a flat triangle.
+    #[inline]
+    pub fn corner_normals(&self, id: u32) -> Option<[Vec3; 3]> {
+        let geometry = &self.geometry;
+        if geometry.own_normals.is_empty() {
+            return None;
+        }
+        let map = self.objects[geometry.object_of[id as usize].0 as usize].world_from_own_normal;
+        let own = geometry.triangles[id as usize].map(|v| geometry.own_normals[v as usize]);
+        if own.contains(&Vec3::ZERO) {
+            return None;
+        }
+        Some(own.map(|normal| (map * normal).normalize_or_zero()))
+    }
+
+    /// The unit normal by which a picture weighs the light that arrives at (u, v) of a triangle, front side, in the scene's
+    /// space. Light that goes on from there bounces off the flat triangle.
+    #[inline]
+    pub fn shading_normal(&self, id: u32, [u, v]: [f32; 2]) -> Vec3 {
+        let flat = self.geometry.normals[id as usize];
+        let Some([a, b, c]) = self.corner_normals(id) else { return flat };
+        surface::shading_normal(flat, a * (1.0 - u - v) + b * u + c * v)
     }
 }
 

@@ -23,6 +23,25 @@ pub fn normal(v: [Vec3; 3]) -> Option<Vec3> {
     (length > 0.0 && length.is_finite()).then(|| (cross / length).as_vec3())
 }
 
+/// Smallest cosine between a shading normal and the geometric one: 60°. Beyond it a surface is as flat as its triangle.
+pub const SHADING_COS: f32 = 0.5;
+
+/// The unit normal that light from the eye's side is weighed by, between the vertex normals `bent`, whose weighted sum it
+/// follows; `flat`, the geometric normal, where that sum leads farther off than [`SHADING_COS`] or a vertex has none (zero).
+///
+/// Twin: `shading_normal` in surface.wgsl.
+#[inline]
+pub fn shading_normal(flat: Vec3, bent: Vec3) -> Vec3 {
+    let length_sq = bent.length_squared();
+    let cosine = flat.dot(bent);
+    // Neither zero nor NaN is larger.
+    if cosine > 0.0 && cosine * cosine > SHADING_COS * SHADING_COS * length_sq {
+        bent / length_sq.sqrt()
+    } else {
+        flat
+    }
+}
+
 /// The area of a triangle in m².
 pub fn area(v: [Vec3; 3]) -> f64 {
     let [a, b, c] = v.map(Vec3::as_dvec3);
@@ -98,5 +117,24 @@ mod tests {
         assert_eq!(normal([Vec3::ZERO, Vec3::X, Vec3::X * 2.0]), None);
         assert_eq!(normal([Vec3::ONE; 3]), None);
         assert_eq!(area([Vec3::ZERO, Vec3::X, Vec3::Y]), 0.5);
+    }
+
+    /// Up to 60° the sum of the corners' normals is followed, at unit length; farther off, and without any, the triangle is flat.
+    #[test]
+    fn shading_normals_stay_near_the_triangles() {
+        for degrees in [0.0f32, 1.0, 30.0, 59.9] {
+            let (s, c) = degrees.to_radians().sin_cos();
+            let bent = Vec3::new(s, 0.0, c);
+            for length in [1e-6, 0.3, 1.0] {
+                assert!(
+                    (shading_normal(Vec3::Z, bent * length) - bent).length() < 2.0 * f32::EPSILON,
+                    "{degrees}"
+                );
+            }
+        }
+        let (s, c) = 60.1f32.to_radians().sin_cos();
+        for bent in [Vec3::ZERO, Vec3::NAN, Vec3::NEG_Z, Vec3::new(s, 0.0, c), Vec3::X] {
+            assert_eq!(shading_normal(Vec3::Z, bent), Vec3::Z, "{bent}");
+        }
     }
 }

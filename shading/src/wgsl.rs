@@ -28,13 +28,15 @@ pub const PATCH: &str = include_str!("../wgsl/patch.wgsl");
 pub const SKY: &str = include_str!("../wgsl/sky.wgsl");
 /// Twin of [`crate::sobol`].
 pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
+/// Twin of [`crate::surface`]: the shading normal.
+pub const SURFACE: &str = include_str!("../wgsl/surface.wgsl");
 /// Twin of [`crate::texture`]; the module that includes it has `texels: array<vec2u>`.
 pub const TEXTURE: &str = include_str!("../wgsl/texture.wgsl");
 /// Twin of [`crate::tone`].
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 12] = [
+pub const TWINS: [(&str, &str); 13] = [
     ("kernel", KERNEL),
     ("basis", BASIS),
     ("distance_map", DISTANCE_MAP),
@@ -45,6 +47,7 @@ pub const TWINS: [(&str, &str); 12] = [
     ("patch", PATCH),
     ("sky", SKY),
     ("sobol", SOBOL),
+    ("surface", SURFACE),
     ("texture", TEXTURE),
     ("tone", TONE),
 ];
@@ -85,6 +88,7 @@ pub fn constants() -> String {
     float("F32_MAX", f32::MAX);
     float("F32_MIN_POSITIVE", f32::MIN_POSITIVE);
     float("RELATIVE_OFFSET", surface::RELATIVE_OFFSET);
+    float("SHADING_COS", surface::SHADING_COS);
     float("PATCH_NEAR_AREAS", patch::NEAR_AREAS);
     float("DISTANCE_BIAS_TEXELS", distance_map::BIAS_TEXELS);
     let _ = writeln!(text, "const DISTANCE_LEAST: u32 = {}u;", distance_map::LEAST);

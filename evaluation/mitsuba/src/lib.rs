@@ -94,7 +94,7 @@ pub fn export(scene: &Scene, folder: &Path) -> Result<Exported, ExportError> {
         write(folder.join(sky::FILE), &bytes)?;
     }
     for (index, object) in scene.objects.iter().enumerate() {
-        let bytes = ply::encode(&scene.geometry, object.triangles.clone());
+        let bytes = ply::encode(scene, object.triangles.clone());
         write(folder.join(surfaces::mesh_file(index, &object.name)), &bytes)?;
     }
     Ok(Exported {

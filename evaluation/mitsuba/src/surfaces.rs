@@ -2,7 +2,7 @@
 
 use super::{
     document::{Document, identifier},
-    sky, spot, textures,
+    ply, sky, spot, textures,
 };
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -24,8 +24,9 @@ pub(crate) fn write(scene: &Scene, document: &mut Document) -> usize {
             &[("type", &"ply"), ("id", &format_args!("object{index}-{}", identifier(&object.name)))],
         );
         document.property("string", "filename", mesh_file(index, &object.name));
-        // Triangles are flat: no normals made up between neighbours.
-        document.property("boolean", "face_normals", "true");
+        // No normals made up between neighbours.
+        let is_smooth = ply::is_smooth(scene, object.triangles.clone());
+        document.property("boolean", "face_normals", if is_smooth { "false" } else { "true" });
         let material = object.material.0 as usize;
         reflectance(document, object.sides, (material, &scene.materials[material]));
         let radiance = scene.emitted_radiance(id, Side::Front);

@@ -44,6 +44,10 @@ pub(crate) fn radiance(
         }
         beta *= surface.albedo / survival;
         let direction = sampling::cosine_hemisphere(surface.normal, sample.next_2d());
+        if direction.dot(surface.flat) <= 0.0 {
+            // Above the shading normal's horizon, and into the surface itself.
+            break;
+        }
         *rays += 1;
         let Some(next) = surface::first(scene, surface.ray_origin, direction, 0.0) else { break };
         if next.albedo == Vec3::ZERO {

@@ -156,7 +156,7 @@ impl PixelTracer<'_> {
         let (width, height) = (self.options.width, self.options.height);
         let camera = &self.scene.camera;
         let direction = camera.direction(self.x as f32 + u, self.y as f32 + v, width, height);
-        surface::first(self.scene, camera.position, direction, 0.0)
+        surface::seen(self.scene, camera.position, direction, 0.0)
             .ok_or_else(|| self.scene.background(direction))
     }
 }

@@ -8,3 +8,4 @@ mod reference_closed_forms;
 mod reference_noise;
 mod scenes;
 mod sky;
+mod smooth;

@@ -9,6 +9,7 @@ mod extremes;
 mod only_what_changed;
 mod scenes;
 mod sky;
+mod smooth;
 mod textured;
 mod twin_distance_map;
 mod twin_texture;

@@ -40,12 +40,13 @@ struct Table<'c, 'a> {
     transmit: &'c [String],
     materials: Option<&'c BTreeMap<String, String>>,
     frame: Frame,
+    smooth: bool,
     field: Field<'a>,
     load: fn(&Path, Frame, &[String]) -> Loaded,
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
-    if let Some(ObjConfig { path, up_axis, unit_m, exclude, transmit, materials }) = &mut object.obj {
+    if let Some(ObjConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials }) = &mut object.obj {
         let field = field.key("obj");
         let frame = Frame::resolve(up_axis, unit_m, &field)?;
         let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
@@ -55,17 +56,19 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
             transmit,
             materials: materials.as_ref(),
             frame,
+            smooth: *smooth.get_or_insert(true),
             field,
             load: |path, frame, _| load_obj(path, frame),
         });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, exclude, transmit, materials } = gltf;
+    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials } = gltf;
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
     let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
     let materials = materials.as_ref();
-    Ok(Table { path, exclude, transmit, materials, frame, field, load: load_gltf })
+    let smooth = *smooth.get_or_insert(true);
+    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, load: load_gltf })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -97,7 +100,8 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, transmit, materials, frame, field, load } = table(object, context.field)?;
+    let Table { path, exclude, transmit, materials, frame, smooth, field, load } =
+        table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
     let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
@@ -137,7 +141,11 @@ pub(super) fn read(
             material: &material,
             override_material: overriding.map(String::as_str),
         };
-        parts.push(part(source, content, surface, (sides, placement), context));
+        let mut part = part(source, content, surface, (sides, placement), context);
+        if !smooth {
+            part.mesh.normals.clear();
+        }
+        parts.push(part);
     }
     if parts.is_empty() {
         return Err(asset_error(file, "no faces are left of it".into(), "check the file and `exclude`"));
@@ -209,6 +217,7 @@ fn part<'a>(
     if emits && sides == Sides::Back {
         // Emitters shine from their front: the file's winding is turned to bring it where the reflecting side is.
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
         faces.iter_mut().for_each(|face| match face {
             EmitterFace::Parallelogram(corners) | EmitterFace::Triangle(corners) => corners.swap(1, 2),
         });

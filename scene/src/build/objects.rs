@@ -103,7 +103,7 @@ fn imported_mesh(
     roots: &AssetRoots,
     inputs: &mut Inputs<'_>,
 ) -> Result<Option<Mesh>, SceneError> {
-    let Some(PlyConfig { path, up_axis, unit_m }) = &mut object.ply else { return Ok(None) };
+    let Some(PlyConfig { path, up_axis, unit_m, smooth }) = &mut object.ply else { return Ok(None) };
     let field = field.key("ply");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
     let path_field = field.key("path");
@@ -113,10 +113,13 @@ fn imported_mesh(
         inputs.contents.insert(name.to_owned(), (absolute, content));
         read_ply(&bytes, frame)
     });
-    let mesh = mesh.map_err(|problem| {
+    let mut mesh = mesh.map_err(|problem| {
         imported::asset_error(&path_field, file.clone(), problem, "export it anew, or remove the object")
     })?;
     inputs.files.push(file);
+    if !*smooth.get_or_insert(true) {
+        mesh.normals.clear();
+    }
     Ok(Some(mesh))
 }
 

@@ -25,6 +25,8 @@ pub struct ObjConfig {
     pub up_axis: Option<UpAxis>,
     /// Metres in a unit of the file; default 1.
     pub unit_m: Option<f64>,
+    /// Whether pictures weigh light by the file's normals, which makes a mesh look curved; default true.
+    pub smooth: Option<bool>,
     /// Groups, materials or `group/material` pairs to leave out.
     pub exclude: Option<Vec<String>>,
     /// Groups, materials or `group/material` pairs of clear panes: light passes straight through, and nothing is seen of
@@ -45,6 +47,8 @@ pub struct PlyConfig {
     pub up_axis: Option<UpAxis>,
     /// Metres in a unit of the file; default 1.
     pub unit_m: Option<f64>,
+    /// Whether pictures weigh light by the file's normals, which makes a mesh look curved; default true.
+    pub smooth: Option<bool>,
 }
 
 /// `gltf`: one object for each pair of node and material of a glTF or GLB file, called `NAME/node/material`, and a light
@@ -59,6 +63,8 @@ pub struct GltfConfig {
     pub up_axis: Option<UpAxis>,
     /// Metres in a unit of the file; default 1.
     pub unit_m: Option<f64>,
+    /// Whether pictures weigh light by the file's normals, which makes a mesh look curved; default true.
+    pub smooth: Option<bool>,
     /// Nodes (with all below them), materials or `node/material` pairs to leave out.
     pub exclude: Option<Vec<String>>,
     /// Nodes, materials or `node/material` pairs of clear panes: light passes straight through, and nothing is seen of

@@ -142,6 +142,7 @@ impl SceneEdit {
             let mesh = &scene.rest_meshes[id.0 as usize];
             let object = &mut scene.objects[id.0 as usize];
             object.world_from_rest = pose.world_from_rest(mesh.centre(pose.scale));
+            object.world_from_own_normal = pose.world_from_own_normal();
             scene.poses[id.0 as usize] = *pose;
             let range = mesh.vertices.start as usize..mesh.vertices.end as usize;
             for (vertex, &own) in geometry.vertices[range].iter_mut().zip(&mesh.own) {

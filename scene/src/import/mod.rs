@@ -20,7 +20,7 @@ pub(crate) use ply::read_ply;
 pub(crate) use sky_map::read_radiances;
 
 use crate::{bake::EmitterFace, picture::Texture, primitives::Mesh};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::{collections::BTreeMap, path::PathBuf};
 
 /// Most triangles of one imported file, instances counted each: 2²⁵.
@@ -52,6 +52,14 @@ pub(crate) struct Import {
     pub(crate) files: Vec<PathBuf>,
     /// Hash of the content of all files read.
     pub(crate) content: blake3::Hash,
+}
+
+/// A file's normal at unit length; zero, which is flat, where it leads nowhere.
+fn unit(normal: DVec3) -> Vec3 {
+    // Of any length: a square could overflow.
+    let longest = normal.abs().max_element();
+    let normal = (normal / longest).as_vec3();
+    if longest > 0.0 && normal.is_finite() { normal.normalize() } else { Vec3::ZERO }
 }
 
 /// Whether a node was left out by its name.

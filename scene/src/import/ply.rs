@@ -1,6 +1,6 @@
 //! Turns a PLY file into a mesh: positions and polygons, in text or binary of either byte order.
 
-use super::{Frame, Group, MAX_TRIANGLES, polygons::push_polygon};
+use super::{Frame, Group, MAX_TRIANGLES, polygons::push_polygon, unit};
 use crate::primitives::Mesh;
 use glam::DVec3;
 use ply_rs_bw::{
@@ -12,8 +12,8 @@ use ply_rs_bw::{
 };
 use std::io::BufRead;
 
-/// Reads the faces of a PLY file. Properties other than `x`, `y`, `z` and `vertex_indices` (or `vertex_index`) are passed
-/// over.
+/// Reads the faces of a PLY file. Properties other than `x`, `y`, `z`, `nx`, `ny`, `nz` and `vertex_indices` (or
+/// `vertex_index`) are passed over.
 ///
 /// What is allocated is bounded by the length of `bytes`, whatever counts they name.
 ///
@@ -44,13 +44,20 @@ pub(crate) fn read_ply(bytes: &[u8], frame: Frame) -> Result<Mesh, String> {
             if header.elements.contains_key("tristrips") { "; triangle strips are not read" } else { "" };
         return Err(format!("it has no element \"face\" with a list \"vertex_indices\"{strips}"));
     }
+    let has_normals = header
+        .elements
+        .get("vertex")
+        .is_some_and(|vertex| NORMALS.iter().all(|n| vertex.properties.contains_key(*n)));
     let mut payload = Payload { rest, encoding: header.encoding };
     let mut mesh = Group::default();
     let (mut corners, mut arities) = (Vec::new(), Vec::new());
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => payload.each(element, |vertex: Vertex| {
-                mesh.mesh.vertices.push(frame.apply(vertex.0));
+                mesh.mesh.vertices.push(frame.apply(vertex.position));
+                if has_normals {
+                    mesh.mesh.normals.push(unit(frame.turn(vertex.normal)));
+                }
                 Ok(())
             })?,
             "face" => payload.each(element, |face: Face| {
@@ -168,12 +175,18 @@ impl Payload<'_> {
     }
 }
 
-/// A position, in the file's own coordinates.
-struct Vertex(DVec3);
+/// The properties of a vertex's normal.
+const NORMALS: [&str; 3] = ["nx", "ny", "nz"];
+
+/// A position and a normal, in the file's own coordinates.
+struct Vertex {
+    position: DVec3,
+    normal: DVec3,
+}
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        Self(DVec3::ZERO)
+        Self { position: DVec3::ZERO, normal: DVec3::ZERO }
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
@@ -189,9 +202,12 @@ impl PropertyAccess for Vertex {
             _ => return PropertyAccessResult::Ignored,
         };
         match name {
-            "x" => self.0.x = value,
-            "y" => self.0.y = value,
-            "z" => self.0.z = value,
+            "x" => self.position.x = value,
+            "y" => self.position.y = value,
+            "z" => self.position.z = value,
+            "nx" => self.normal.x = value,
+            "ny" => self.normal.y = value,
+            "nz" => self.normal.z = value,
             _ => return PropertyAccessResult::Ignored,
         }
         PropertyAccessResult::Set

@@ -82,7 +82,7 @@ impl ModelFile {
             Kind::Gltf => object.gltf = Some(GltfConfig { path, up_axis, unit_m, ..Default::default() }),
             Kind::Obj => object.obj = Some(ObjConfig { path, up_axis, unit_m, ..Default::default() }),
             Kind::Ply => {
-                object.ply = Some(PlyConfig { path, up_axis, unit_m });
+                object.ply = Some(PlyConfig { path, up_axis, unit_m, smooth: None });
                 object.material = Some(GREY.0.into());
             }
         }

@@ -12,5 +12,5 @@ pub(crate) fn cuboid(size: DVec3, centre: DVec3) -> Mesh {
     let faces: [[u32; 4]; 6] =
         [[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]];
     let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    Mesh { vertices, triangles, uvs: Vec::new() }
+    Mesh { vertices, triangles, ..Mesh::default() }
 }

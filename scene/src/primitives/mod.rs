@@ -10,7 +10,8 @@ pub(crate) use quad::quad;
 pub(crate) use sphere::sphere;
 pub(crate) use torus_knot::{TorusKnot, torus_knot};
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
+use std::ops::Range;
 
 /// A triangle mesh in an object's own coordinates, m; counter-clockwise seen from the front.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,6 +20,28 @@ pub(crate) struct Mesh {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Texture coordinates of the vertices, rows counted from the top; none at all for most meshes.
     pub(crate) uvs: Vec<Vec2>,
+    /// Unit shading normals of the vertices, zero where one has none; none at all for flat meshes.
+    pub(crate) normals: Vec<Vec3>,
+}
+
+impl Mesh {
+    /// Adds vertices, each with its texture coordinates and its shading normal where `uvs` and `normals` have them; the mesh's
+    /// others get zeros.
+    pub(crate) fn append(&mut self, vertices: Vec<DVec3>, uvs: &[Vec2], normals: &[Vec3]) {
+        let first = self.vertices.len();
+        self.vertices.extend(vertices);
+        extend(&mut self.uvs, uvs, first..self.vertices.len());
+        extend(&mut self.normals, normals, first..self.vertices.len());
+    }
+}
+
+/// Gives the vertices of a part of a mesh their attributes, if it has any; those of other parts have zeros.
+pub(crate) fn extend<T: Clone + Default>(all: &mut Vec<T>, own: &[T], vertices: Range<usize>) {
+    if !own.is_empty() || !all.is_empty() {
+        all.resize(vertices.start, T::default());
+        all.extend_from_slice(own);
+        all.resize(vertices.end, T::default());
+    }
 }
 
 /// Sine and cosine of `turn` full turns; exact at multiples of a quarter, so that right angles stay right.

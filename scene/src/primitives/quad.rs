@@ -8,6 +8,6 @@ pub(crate) fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Mesh {
     Mesh {
         vertices: vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        uvs: Vec::new(),
+        ..Mesh::default()
     }
 }

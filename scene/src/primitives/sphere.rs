@@ -34,5 +34,5 @@ pub(crate) fn sphere(radius: f64, segments: u32) -> Mesh {
             }
         }
     }
-    Mesh { vertices, triangles, uvs: Vec::new() }
+    Mesh { vertices, triangles, ..Mesh::default() }
 }

@@ -53,5 +53,5 @@ pub(crate) fn torus_knot(shape: TorusKnot) -> Mesh {
             triangles.push([quad[1], quad[2], quad[3]]);
         }
     }
-    Mesh { vertices, triangles, uvs: Vec::new() }
+    Mesh { vertices, triangles, ..Mesh::default() }
 }

@@ -172,3 +172,51 @@ fn accessors_are_strided_quantised_and_sparse() {
     assert_eq!(corners[1], Vec3::new(1.0, -1.0, 1.0));
     assert_eq!(corners[5], Vec3::new(-1.0, 1.0, 0.0));
 }
+
+/// Normals in normalised i8, three bytes in four, on a node that mirrors and stretches: they lead out as the winding does, and
+/// stretch inversely. To 0.5/127 of rounding in the file, and a few roundings of f32.
+#[test]
+fn normals_are_quantised_and_follow_their_node() {
+    let mut data = bytes();
+    data.truncate(72);
+    let normals = [[64i8, 0, 110], [0, 0, 127], [0, 64, 110], [0, 0, -127], [0, 0, 127]];
+    normals.iter().for_each(|n| data.extend(n.map(|x| x as u8).into_iter().chain([0])));
+    let scene = scene(&[
+        ("/extensionsRequired", json!(["KHR_mesh_quantization"])),
+        ("/nodes/0/scale", json!([-2, 1, 1])),
+        ("/meshes/0/primitives/0/attributes/NORMAL", json!(2)),
+        (
+            "/accessors",
+            json!([
+                { "bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3" },
+                { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" },
+                { "bufferView": 2, "componentType": 5120, "normalized": true, "count": 5, "type": "VEC3" },
+            ]),
+        ),
+        (
+            "/bufferViews",
+            json!([
+                { "buffer": 0, "byteLength": 60 },
+                { "buffer": 0, "byteOffset": 60, "byteLength": 12 },
+                { "buffer": 0, "byteOffset": 72, "byteLength": 20, "byteStride": 4 },
+            ]),
+        ),
+        ("/buffers/0", json!({ "byteLength": 92, "uri": data_uri(&data) })),
+    ]);
+    let expected = |place: Vec3| match (place.x > 0.0, place.y > 0.0) {
+        (true, false) => Vec3::new(-64.0 / 2.0, 0.0, 110.0),
+        (false, false) => Vec3::Z,
+        (false, true) => Vec3::new(0.0, 64.0, 110.0),
+        // Against its face: counted for the corner, and the triangle is flat where it outweighs the others.
+        (true, true) => Vec3::NEG_Z,
+    };
+    for t in 0..2 {
+        assert_eq!(scene.geometry.normals[t as usize], Vec3::Z);
+        for (place, found) in scene.geometry.triangle(t).into_iter().zip(scene.corner_normals(t).unwrap()) {
+            assert!((found - expected(place).normalize()).length() < 1e-6, "{place}: {found}");
+            assert!(found.is_normalized());
+        }
+    }
+    let error = Files::new(&with(&[("/meshes/0/primitives/0/attributes/NORMAL", json!(1))])).error();
+    assert!(error.contains("found Scalar, expected Vec3"), "{error}");
+}

@@ -68,6 +68,10 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
             if is_mirrored {
                 surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
+            let normals_to_world = node.world.matrix3.inverse().transpose();
+            for normal in &mut surface.normals {
+                *normal = frame.turn(normals_to_world * *normal);
+            }
             for vertex in &mut surface.vertices {
                 *vertex = place(*vertex);
                 if !vertex.is_finite() {

@@ -1,8 +1,11 @@
 //! Turns a primitive of a glTF mesh into a surface of its own vertices, and that into a part of a group.
 
 use super::{Group, accessor::Accessors};
-use crate::{bake::EmitterFace, import::polygons::is_parallelogram};
-use glam::{DAffine2, DVec2, DVec3, Vec2};
+use crate::{
+    bake::EmitterFace,
+    import::{polygons::is_parallelogram, unit},
+};
+use glam::{DAffine2, DVec2, DVec3, Vec2, Vec3};
 use gltf::json::{
     accessor::Type,
     mesh::{Mode, Primitive, Semantic},
@@ -33,6 +36,8 @@ pub(super) struct Surface {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Texture coordinates of the vertices, where they were asked for.
     pub(super) uvs: Vec<Vec2>,
+    /// Normals of the vertices as the file has them, where it has them.
+    pub(super) normals: Vec<DVec3>,
     /// How many were looked at, those that only turn a strip included.
     pub(super) read: usize,
 }
@@ -78,6 +83,11 @@ pub(super) fn read(
         }
         None => None,
     };
+    let normals = primitive.attributes.get(&Checked::Valid(Semantic::Normals));
+    let normals = normals.map(|normals| accessors.elements::<3>(*normals, Type::Vec3)).transpose()?;
+    if let Some(normals) = normals.as_ref().filter(|normals| normals.count < positions.count) {
+        return Err(format!("{} normals for {} vertices", normals.count, positions.count));
+    }
     let corners = indices.as_ref().map_or(positions.count, |indices| indices.count);
     let number = match mode {
         Mode::Triangles => corners / 3,
@@ -108,6 +118,7 @@ pub(super) fn read(
                 if let Some((elements, uvs)) = &coordinates {
                     surface.uvs.push(uvs.of(elements.get(n)));
                 }
+                surface.normals.extend(normals.as_ref().map(|normals| DVec3::from_array(normals.get(n))));
                 surface.vertices.len() as u32 - 1
             })
         }));
@@ -131,14 +142,9 @@ fn corners_of(mode: Mode, i: usize) -> [usize; 3] {
 /// Adds a surface to a group, with its faces if it emits.
 pub(super) fn append(group: &mut Group, surface: Surface, emits: bool) {
     let first = group.mesh.vertices.len() as u32;
-    let uvs = &mut group.mesh.uvs;
-    if !surface.uvs.is_empty() || !uvs.is_empty() {
-        // Primitives without have texel (0, 0) everywhere.
-        uvs.resize(first as usize, Vec2::ZERO);
-        uvs.extend(&surface.uvs);
-        uvs.resize(first as usize + surface.vertices.len(), Vec2::ZERO);
-    }
-    group.mesh.vertices.extend(surface.vertices);
+    // Primitives without texture coordinates have texel (0, 0) everywhere, those without normals are flat.
+    let normals: Vec<Vec3> = surface.normals.into_iter().map(unit).collect();
+    group.mesh.append(surface.vertices, &surface.uvs, &normals);
     let triangles = surface.triangles.into_iter().map(|t| t.map(|i| i + first));
     let start = group.mesh.triangles.len();
     group.mesh.triangles.extend(triangles);

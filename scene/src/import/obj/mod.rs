@@ -1,6 +1,7 @@
 //! Turns a Wavefront OBJ file and its MTL files into meshes by group and material, reflectances and emitters.
 
 mod materials;
+mod smoothing;
 mod statements;
 
 use super::{
@@ -9,10 +10,11 @@ use super::{
     gltf::MAX_UV,
     pictures::Pictures,
     polygons::push_polygon,
+    unit,
 };
-use glam::{DAffine2, DVec2, DVec3, Vec2};
+use glam::{DAffine2, DVec2, DVec3, Vec2, Vec3};
 use materials::{Surfaces, library};
-use statements::{Faces, NO_UV, Statements};
+use statements::{Faces, NONE, Statements};
 use std::{
     collections::{BTreeMap, HashMap, hash_map::Entry},
     path::Path,
@@ -30,7 +32,8 @@ pub(crate) fn load_obj(path: &Path, frame: Frame) -> Loaded {
     let bytes = beside::read(path).map_err(at)?;
     let mut beside = Beside::new(path, &bytes);
     let read = statements::read(&bytes).map_err(|e| at(format!("not a valid OBJ file: {e}")))?;
-    let Statements { positions, uvs, faces, libraries, unread } = read;
+    let Statements { positions, uvs, mut normals, mut faces, libraries, unread } = read;
+    smoothing::fill(&positions, &mut normals, &mut faces).map_err(at)?;
 
     let (mut materials, mut material_problem) = (Vec::new(), None);
     for name in &libraries {
@@ -51,7 +54,7 @@ pub(crate) fn load_obj(path: &Path, frame: Frame) -> Loaded {
     }
 
     let mut groups: BTreeMap<(String, String), Group> = BTreeMap::new();
-    let corners = Corners { positions: &positions, uvs: &uvs, frame };
+    let corners = Corners { positions: &positions, uvs: &uvs, normals: &normals, frame };
     for ((group, material), faces) in &faces {
         let known = transforms.get(material.as_str());
         let material = if known.is_some() { plain(material) } else { NO_MATERIAL.to_owned() };
@@ -89,23 +92,24 @@ fn plain(name: &str) -> String {
 struct Corners<'a> {
     positions: &'a [DVec3],
     uvs: &'a [DVec2],
+    normals: &'a [DVec3],
     frame: Frame,
 }
 
 impl Corners<'_> {
     /// Adds faces to a group; with `map`, the map from their texture coordinates to those of the picture, they have these.
     fn append(&self, group: &mut Group, faces: &Faces, map: Option<DAffine2>) -> Result<(), String> {
-        let mut own: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut own: HashMap<[u32; 3], u32> = HashMap::new();
         let mut rest = faces.corners.as_slice();
         let mut polygon = Vec::new();
         for &arity in &faces.arities {
             let (face, others) = rest.split_at(arity as usize);
             rest = others;
             polygon.clear();
-            for &[position, uv] in face {
-                let uv = if map.is_some() { uv } else { NO_UV };
+            for &[position, uv, normal] in face {
+                let uv = if map.is_some() { uv } else { NONE };
                 let mesh = &mut group.mesh;
-                polygon.push(match own.entry([position, uv]) {
+                polygon.push(match own.entry([position, uv, normal]) {
                     Entry::Occupied(known) => *known.get(),
                     Entry::Vacant(place) => {
                         let index = mesh.vertices.len() as u32;
@@ -113,11 +117,19 @@ impl Corners<'_> {
                         if let Some(map) = map {
                             mesh.uvs.push(self.uv(uv, &map)?);
                         }
+                        if let Some(&normal) = self.normals.get(normal as usize) {
+                            mesh.normals.resize(index as usize, Vec3::ZERO);
+                            mesh.normals.push(unit(self.frame.turn(normal)));
+                        }
                         *place.insert(index)
                     }
                 });
             }
             push_polygon(group, &polygon);
+        }
+        if !group.mesh.normals.is_empty() {
+            // Faces without normals are flat.
+            group.mesh.normals.resize(group.mesh.vertices.len(), Vec3::ZERO);
         }
         Ok(())
     }

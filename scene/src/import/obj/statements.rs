@@ -1,4 +1,4 @@
-//! Turns the text of an OBJ file into positions, texture coordinates, and faces by group and material.
+//! Turns the text of an OBJ file into positions, texture coordinates, normals, and faces by group and material.
 //!
 //! Read here and not by tobj: that checks the numbers of texture coordinates less strictly than those of positions.
 
@@ -13,6 +13,7 @@ const NO_GROUP: &str = "unnamed_object";
 pub(super) struct Statements {
     pub(super) positions: Vec<DVec3>,
     pub(super) uvs: Vec<DVec2>,
+    pub(super) normals: Vec<DVec3>,
     /// By group and the name of the material, the empty one where none is named.
     pub(super) faces: BTreeMap<(String, String), Faces>,
     /// Material files, in the order they are named.
@@ -25,11 +26,13 @@ pub(super) struct Statements {
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     pub(super) arities: Vec<u32>,
-    /// Position and texture coordinates of each corner; [`NO_UV`] where it has none.
-    pub(super) corners: Vec<[u32; 2]>,
+    /// The smoothing group of each polygon, 0 for none.
+    pub(super) smoothing: Vec<u32>,
+    /// Position, texture coordinates and normal of each corner; [`NONE`] where it has none.
+    pub(super) corners: Vec<[u32; 3]>,
 }
 
-pub(super) const NO_UV: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Reads the statements of a file.
 ///
@@ -39,7 +42,7 @@ pub(super) const NO_UV: u32 = u32::MAX;
 /// Source: Wavefront, *Advanced Visualizer Manual*, appendix B1: Object Files.
 pub(super) fn read(bytes: &[u8]) -> Result<Statements, String> {
     let mut found = Statements::default();
-    let (mut group, mut material) = (NO_GROUP.to_owned(), String::new());
+    let (mut group, mut material, mut smoothing) = (NO_GROUP.to_owned(), String::new(), 0);
     let mut lines = bytes.split(|b| *b == b'\n').enumerate();
     while let Some((number, line)) = lines.next() {
         let at = |problem: String| format!("line {}: {problem}", number + 1);
@@ -69,9 +72,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Statements, String> {
                 let v = words.next().map_or(Ok(0.0), |word| number_of(Some(word))).map_err(at)?;
                 found.uvs.push(DVec2::new(u, v));
             }
+            "vn" => {
+                let [x, y, z] = numbers(rest).map_err(at)?;
+                found.normals.push(DVec3::new(x, y, z));
+            }
+            // "off" is 0; some write "on" for one group of all.
+            "s" => smoothing = if rest == "on" { 1 } else { rest.parse().unwrap_or(0) },
             "f" | "fo" => {
                 let key = (group.clone(), material.clone());
-                let counts = [found.positions.len(), found.uvs.len()];
+                let counts = [found.positions.len(), found.uvs.len(), found.normals.len()];
                 let faces = found.faces.entry(key).or_default();
                 let mut arity = 0;
                 for word in rest.split_whitespace().take_while(|word| !word.starts_with('#')) {
@@ -79,12 +88,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Statements, String> {
                     arity += 1;
                 }
                 faces.arities.push(arity);
+                faces.smoothing.push(smoothing);
             }
             "g" | "o" => group = if rest.is_empty() { NO_GROUP.into() } else { rest.to_owned() },
             "usemtl" => material = rest.to_owned(),
             "mtllib" => found.libraries.extend(library_names(rest)),
-            // Points and lines have no surface; normals follow from the faces.
-            "p" | "l" | "vn" | "s" | "vp" => {}
+            // Points and lines have no surface.
+            "p" | "l" | "vp" => {}
             other => *found.unread.entry(other.chars().take(20).collect()).or_default() += 1,
         }
     }
@@ -115,16 +125,17 @@ fn number_of(word: Option<&str>) -> Result<f64, String> {
     number.ok_or_else(|| format!("found {:?}, expected a number", word.chars().take(40).collect::<String>()))
 }
 
-/// Position and texture coordinates of a corner: `v`, `v/vt`, `v/vt/vn` or `v//vn`, counted from 1, or from the end by
-/// negative numbers.
-fn corner(word: &str, [positions, uvs]: [usize; 2]) -> Result<[u32; 2], String> {
+/// Position, texture coordinates and normal of a corner: `v`, `v/vt`, `v/vt/vn` or `v//vn`, counted from 1, or from the end
+/// by negative numbers.
+fn corner(word: &str, [positions, uvs, normals]: [usize; 3]) -> Result<[u32; 3], String> {
     let mut parts = word.split('/');
     let position = index(parts.next().unwrap_or_default(), positions, "position")?;
-    let uv = match parts.next() {
-        None | Some("") => NO_UV,
-        Some(part) => index(part, uvs, "texture coordinate")?,
+    let mut optional = |count, what| match parts.next() {
+        None | Some("") => Ok(NONE),
+        Some(part) => index(part, count, what),
     };
-    Ok([position, uv])
+    let uv = optional(uvs, "texture coordinate")?;
+    Ok([position, uv, optional(normals, "normal")?])
 }
 
 fn index(text: &str, count: usize, what: &str) -> Result<u32, String> {
@@ -132,6 +143,6 @@ fn index(text: &str, count: usize, what: &str) -> Result<u32, String> {
     let number: i64 =
         text.parse().map_err(|_| format!("found {:?}, expected the number of a {what}", short()))?;
     let index = if number < 0 { count as i64 + number } else { number - 1 };
-    let index = u32::try_from(index).ok().filter(|&i| (i as usize) < count && i != NO_UV);
+    let index = u32::try_from(index).ok().filter(|&i| (i as usize) < count && i != NONE);
     index.ok_or_else(|| format!("it names {what} {number}, but there are {count} so far, counted from 1"))
 }
