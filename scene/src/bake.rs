@@ -24,6 +24,8 @@ pub(crate) struct Part<'a> {
     pub(crate) placement: Placement,
     /// Whether it is one of several of a file, and may be left out.
     pub(crate) is_imported: bool,
+    /// Whether its file moves it: triangles that have an area at rest are kept however small they are now.
+    pub(crate) moves: bool,
     pub(crate) emitter: Option<Emitter>,
 }
 
@@ -222,7 +224,11 @@ impl Soup {
         for &[a, b, c] in &part.mesh.triangles {
             let turned = if rest.loaded.is_mirrored() { [a, c, b] } else { [a, b, c] };
             let triangle = turned.map(|i| i + rest.vertices.start);
-            match surface::normal(triangle.map(|i| self.vertices[i as usize])) {
+            let normal = surface::normal(triangle.map(|i| self.vertices[i as usize])).or_else(|| {
+                let at_rest = || triangle.map(|i| self.rest_vertices[i as usize]);
+                part.moves.then(|| rest.loaded.turned_normal(at_rest())).flatten()
+            });
+            match normal {
                 Some(normal) => {
                     self.triangles.push(triangle);
                     self.normals.push(normal);

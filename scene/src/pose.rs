@@ -5,7 +5,7 @@ use crate::{
     placement::Placement,
 };
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
-use photonstream_shading::LightShape;
+use photonstream_shading::{LightShape, surface};
 use std::ops::Range;
 
 /// The mesh of an object in its own coordinates, as exactly as the config gives it.
@@ -59,6 +59,11 @@ impl Pose {
         // Near 1, whatever the size.
         let shrinkage = self.scale.abs().max_element() / self.scale;
         (self.rotation * DMat3::from_diagonal(shrinkage)).as_mat3()
+    }
+
+    /// The normal of a triangle that has no area in the scene's space, from rest space.
+    pub(crate) fn turned_normal(&self, rest: [Vec3; 3]) -> Option<Vec3> {
+        surface::normal(rest).and_then(|n| (self.rotation * n.as_dvec3()).as_vec3().try_normalize())
     }
 
     /// The motion from the rest space around `centre`.

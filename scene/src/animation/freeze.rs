@@ -18,13 +18,17 @@ impl SceneConfig {
     pub fn at(&self, time_s: f64) -> Result<Self, SceneError> {
         check_time(time_s)?;
         let mut frozen = self.clone();
-        if !frozen.animation.is_empty() && frozen.origin_m.is_none() {
+        let has_files = frozen.object.values().any(|object| object.gltf.is_some());
+        if (has_files || !frozen.animation.is_empty()) && frozen.origin_m.is_none() {
             frozen.origin_m = Some(self.clone().build()?.origin_m.into());
         }
         let document = std::mem::take(&mut frozen.document);
         let animation = read(&mut frozen, &Field::root(&document))?;
         animation.write(time_s, &mut frozen);
         frozen.animation.clear();
+        for gltf in frozen.object.values_mut().filter_map(|object| object.gltf.as_mut()) {
+            gltf.animation_time_s.get_or_insert(time_s);
+        }
         frozen.document = document;
         Ok(frozen)
     }

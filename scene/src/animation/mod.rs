@@ -2,21 +2,32 @@
 
 mod freeze;
 mod read;
+mod rig;
 mod track;
 
 use crate::{
     config::{AnimatedProperty, Document, Field},
     edit::{SceneEdit, Values},
     error::SceneError,
+    placement::{Placement, rotation},
     scene::{Object, SceneLight},
 };
 pub(crate) use read::read;
+pub(crate) use rig::{
+    Rider, RiderKind, Rig, Shape, Skeleton,
+    channel::{Between, Channel},
+    hierarchy::{Hierarchy, Joint, Local, Parent},
+    light_at,
+};
+use std::collections::BTreeSet;
 use track::Track;
 
 /// What moves and dims the lights and objects of a scene: a pure function of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Animation {
     targets: Vec<Target>,
+    /// What files animate themselves.
+    rigs: Vec<Rig>,
 }
 
 /// A light or object with all that changes of it.
@@ -45,7 +56,19 @@ const MOST_ROUNDS: u32 = 1000;
 impl Animation {
     /// Whether nothing changes with time.
     pub fn is_empty(&self) -> bool {
-        self.targets.is_empty()
+        self.targets.is_empty() && self.rigs.is_empty()
+    }
+
+    /// Adds what imports move of `objects`; what they have left out is not there to be moved.
+    pub(crate) fn carry(&mut self, rigs: Vec<Rig>, objects: &[Object]) {
+        self.rigs = rigs;
+        let is_there = |rider: &Rider| match rider.kind {
+            RiderKind::Object(_) => objects.binary_search_by(|o| o.name.cmp(&rider.name)).is_ok(),
+            RiderKind::Light { .. } => true,
+        };
+        self.rigs.iter_mut().for_each(|rig| rig.riders.retain(is_there));
+        // What has no duration stands where it was loaded.
+        self.rigs.retain(|rig| rig.skeleton.hierarchy.duration_s > 0.0 && !rig.riders.is_empty());
     }
 
     /// After what time everything begins again, s; `None` where something ends (`repeat = "once"`), nothing changes, or
@@ -55,6 +78,7 @@ impl Animation {
         for (_, track) in self.targets.iter().flat_map(|target| &target.tracks) {
             periods.push(track.period()?);
         }
+        periods.extend(self.rigs.iter().map(|rig| rig.skeleton.hierarchy.duration_s));
         periods.retain(|period| *period > 0.0);
         let longest = periods.iter().copied().reduce(f64::max)?;
         let fits = |all: f64| {
@@ -69,7 +93,8 @@ impl Animation {
     /// From what time on nothing changes any more, s; `None` where something is repeated for ever.
     pub fn end_s(&self) -> Option<f64> {
         let tracks = self.targets.iter().flat_map(|target| &target.tracks);
-        tracks.map(|(_, track)| track.end()).try_fold(0.0, |last, end| Some(end?.max(last)))
+        let rigs = self.rigs.iter().map(|_| None);
+        tracks.map(|(_, track)| track.end()).chain(rigs).try_fold(0.0, |last, end| Some(end?.max(last)))
     }
 
     /// Puts everything that is animated where it is at `time_s`, in simulated seconds since the scene's beginning, by
@@ -81,7 +106,25 @@ impl Animation {
     /// target, or the scene has no such light or object; nothing is changed then.
     pub fn apply(&self, time_s: f64, edit: &mut SceneEdit) -> Result<(), SceneError> {
         check_time(time_s)?;
-        edit.all_or_nothing(|edit| self.targets.iter().try_for_each(|target| target.apply(time_s, edit)))
+        edit.all_or_nothing(|edit| {
+            self.targets.iter().try_for_each(|target| target.apply(time_s, edit))?;
+            self.rigs.iter().try_for_each(|rig| rig.apply(time_s, &self.placement(rig, time_s), edit))
+        })
+    }
+
+    /// How the import of a rig stands: what a scene file animates of it counts.
+    fn placement(&self, rig: &Rig, time_s: f64) -> Placement {
+        let mut placement = rig.placement;
+        let of_import = |target: &&Target| target.kind == Kind::Object && target.name == rig.import;
+        for (property, track) in self.targets.iter().filter(of_import).flat_map(|target| &target.tracks) {
+            match property {
+                AnimatedProperty::Position => placement.position = track.at(time_s),
+                AnimatedProperty::Rotation => placement.rotation = rotation(track.at(time_s)),
+                AnimatedProperty::Scale => placement.scale = track.at(time_s),
+                _ => {}
+            }
+        }
+        placement
     }
 
     /// The numbers of objects and of lights that move; lights move with the objects that show them.
@@ -93,13 +136,26 @@ impl Animation {
                 !dims && target.kind.moves_surface(*property) == surface
             })
         };
+        let riders: BTreeSet<(&str, bool)> = self
+            .rigs
+            .iter()
+            .flat_map(|rig| &rig.riders)
+            .map(|rider| (rider.name.as_str(), matches!(rider.kind, RiderKind::Object(_))))
+            .collect();
+        let rides = |name: &str, is_object| riders.contains(&(name, is_object));
         let moving: Vec<bool> = objects
             .iter()
-            .map(|object| self.targets.iter().any(|t| moves(t, true) && object.is_called(&t.name)))
+            .map(|object| {
+                rides(&object.name, true)
+                    || self.targets.iter().any(|t| moves(t, true) && object.is_called(&t.name))
+            })
             .collect();
         let light_moves = |light: &SceneLight| match light.object {
             Some(object) => moving[object.0 as usize],
-            None => self.targets.iter().any(|t| moves(t, false) && t.name == light.name),
+            None => {
+                rides(&light.name, false)
+                    || self.targets.iter().any(|t| moves(t, false) && t.name == light.name)
+            }
         };
         let count = |moving: &mut dyn Iterator<Item = bool>| moving.filter(|moves| *moves).count() as u32;
         (count(&mut moving.iter().copied()), count(&mut lights.iter().map(light_moves)))

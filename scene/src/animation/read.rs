@@ -46,7 +46,7 @@ pub(crate) fn read(config: &mut SceneConfig, root: &Field<'_>) -> Result<Animati
     config.animation = tables;
     let mut targets: Vec<Target> = targets.into_values().collect();
     targets.iter_mut().for_each(|target| target.tracks.sort_by_key(|(property, _)| property.name()));
-    Ok(Animation { targets })
+    Ok(Animation { targets, rigs: Vec::new() })
 }
 
 /// What tells animations apart: their order in the file has no effect.

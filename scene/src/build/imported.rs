@@ -1,13 +1,15 @@
 //! Turns an object that imports an OBJ or glTF file into one part for each group and material of the file.
 
-use super::{Inputs, imported_lights, materials::Materials};
+use super::{
+    Inputs, imported_lights,
+    imported_motion::{Motion, resolve_choice},
+    materials::Materials,
+};
 use crate::{
     bake::{Emitter, EmitterFace, Part, Strength},
-    config::{Field, GltfConfig, ObjConfig, ObjectConfig},
+    config::{AnimationChoice, Field, GltfConfig, ObjConfig, ObjectConfig},
     error::{SceneError, nearest},
-    import::{
-        AssetRoots, Frame, Group, Import, ImportedMaterial, LeftOut, Loaded, Terms, load_gltf, load_obj,
-    },
+    import::{AssetRoots, Frame, Group, Import, ImportedMaterial, LeftOut, Terms, load_gltf, load_obj},
     placement::Placement,
     primitives::Mesh,
     scene::Sides,
@@ -42,7 +44,8 @@ struct Table<'c, 'a> {
     frame: Frame,
     smooth: bool,
     field: Field<'a>,
-    load: fn(&Path, Frame, &[String]) -> Loaded,
+    /// Which animation plays, and at what moment it is held; of files that can have some.
+    animation: Option<(&'c mut Option<AnimationChoice>, Option<f64>)>,
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
@@ -58,17 +61,22 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
             frame,
             smooth: *smooth.get_or_insert(true),
             field,
-            load: |path, frame, _| load_obj(path, frame),
+            animation: None,
         });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials } = gltf;
+    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, .. } = gltf;
+    let (animation, held_s) = (&mut gltf.animation, gltf.animation_time_s);
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
     let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
+    if let Some(time) = held_s {
+        field.key("animation_time_s").number(time, "a time in s", |_| true)?;
+    }
     let materials = materials.as_ref();
     let smooth = *smooth.get_or_insert(true);
-    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, load: load_gltf })
+    let animation = Some((animation, held_s));
+    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, animation })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -100,12 +108,16 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, transmit, materials, frame, smooth, field, load } =
+    let Table { path, exclude, transmit, materials, frame, smooth, field, animation } =
         table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
     let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
-    let import = load(&file, frame, exclude)
+    let loaded = match &animation {
+        Some((choice, _)) => load_gltf(&file, frame, exclude, choice.as_ref()),
+        None => load_obj(&file, frame),
+    };
+    let import = loaded
         .map_err(|(file, problem)| asset_error(file, problem, "export it anew, or remove the object"))?;
     if let Some(problem) = &import.material_problem {
         if overriding.is_none() {
@@ -125,8 +137,14 @@ pub(super) fn read(
         import.notices.iter().chain(of_materials).map(|notice| format!("object \"{name}\": {notice}"));
     context.notices.extend(notices);
 
+    let mut motion = None;
+    if let Some((choice, held_s)) = animation {
+        resolve_choice(choice, &import.animations, &field.key("animation"))?;
+        let note = |notice| context.notices.push(format!("object \"{name}\": {notice}"));
+        motion = import.played.map(|played| Motion::new(played, frame, placement, held_s, note));
+    }
     let mut parts = Vec::new();
-    for ((group, material), content) in import.groups {
+    for ((group, material), mut content) in import.groups {
         if excluded.contains(&format!("{group}/{material}")) {
             continue;
         }
@@ -141,11 +159,12 @@ pub(super) fn read(
             material: &material,
             override_material: overriding.map(String::as_str),
         };
-        let mut part = part(source, content, surface, (sides, placement), context);
         if !smooth {
-            part.mesh.normals.clear();
+            content.mesh.normals.clear();
         }
-        parts.push(part);
+        let object = source.object();
+        let moved = motion.as_mut().and_then(|motion| motion.place(&group, &object, &mut content));
+        parts.push(part(source, content, surface, (sides, placement, moved), context));
     }
     if parts.is_empty() {
         return Err(asset_error(file, "no faces are left of it".into(), "check the file and `exclude`"));
@@ -154,7 +173,10 @@ pub(super) fn read(
     context.inputs.parts.extend(parts.into_iter().map(|part| (part.name.clone(), part)));
     for light in import.lights {
         let name = format!("{name}/{}", light.node);
-        imported_lights::add(name, light, placement, context.field, context.inputs)?;
+        imported_lights::add(name, light, (placement, motion.as_mut()), context.field, context.inputs)?;
+    }
+    if let Some(motion) = motion {
+        motion.finish(name, context.inputs);
     }
     Ok(())
 }
@@ -169,7 +191,7 @@ fn limit_emitters(parts: &mut [Part<'_>], notices: &mut Vec<String>) {
         let Some(Emitter { strength: Strength::Radiance(radiance), .. }) = part.emitter else { return 0.0 };
         let Mesh { vertices, triangles, .. } = &part.mesh;
         let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|i| vertices[i as usize]);
+            let [a, b, c] = t.map(|i| part.placement.apply(vertices[i as usize]));
             (b - a).cross(c - a).length()
         };
         radiance.element_sum() * triangles.iter().map(area).sum::<f64>() / faces(part) as f64
@@ -201,15 +223,22 @@ struct Source<'s> {
     override_material: Option<&'s str>,
 }
 
+impl Source<'_> {
+    /// The name of the object.
+    fn object(&self) -> String {
+        format!("{}/{}/{}", self.name, self.group, self.material)
+    }
+}
+
 fn part<'a>(
     source: Source<'_>,
     content: Group,
     surface: ImportedMaterial,
-    (sides, placement): (Option<Sides>, Placement),
+    (sides, placement, moved): (Option<Sides>, Placement, Option<Placement>),
     context: &mut Context<'_, 'a>,
 ) -> Part<'a> {
-    let Source { name, group, material, override_material } = source;
-    let part_name = format!("{name}/{group}/{material}");
+    let part_name = source.object();
+    let Source { name, material, override_material, .. } = source;
     let Group { mut mesh, mut faces } = content;
     let sides = sides.unwrap_or(if surface.two_sided { Sides::Both } else { Sides::Front });
     let mut part_sides = sides;
@@ -245,8 +274,9 @@ fn part<'a>(
         material,
         sides: part_sides,
         mesh,
-        placement,
+        placement: moved.unwrap_or(placement),
         is_imported: true,
+        moves: moved.is_some(),
         emitter: emits.then_some(Emitter { strength: Strength::Radiance(surface.radiance), faces }),
     }
 }

@@ -1,7 +1,8 @@
 //! Turns a light of an imported file into one of the scene, as if a table of the config described it.
 
-use super::{Inputs, lights::read_plain};
+use super::{Inputs, imported_motion::Motion, lights::read_plain};
 use crate::{
+    animation::light_at,
     config::{DirectionalConfig, Field, LightConfig, OneOrThree, PointConfig, SpotConfig},
     error::SceneError,
     import::{ImportedLight, ImportedLightKind},
@@ -9,20 +10,31 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Adds `light`, where `placement` puts it. Its power stays what it is, whatever the scale.
+/// Adds `light`, where `placement` puts it, or the motion of its node. Its power stays what it is, whatever the scale.
 ///
 /// # Errors
 /// If a value is none that a config may have.
 pub(super) fn add(
     name: String,
     light: ImportedLight,
-    placement: Placement,
+    (placement, motion): (Placement, Option<&mut Motion>),
     field: &Field<'_>,
     inputs: &mut Inputs<'_>,
 ) -> Result<(), SceneError> {
-    let ImportedLight { position, direction, kind, .. } = light;
-    let position_m = placement.apply(position).into();
-    let direction = (placement.rotation * (placement.scale * direction)).normalize_or_zero().into();
+    let ImportedLight { node, position, direction, kind } = light;
+    let has = match kind {
+        ImportedLightKind::Point { .. } => (true, false),
+        ImportedLightKind::Spot { .. } => (true, true),
+        ImportedLightKind::Directional { .. } => (false, true),
+    };
+    let (position, direction) = match motion.and_then(|motion| motion.carry(&node, &name, has)) {
+        Some(world) => light_at(&world, &placement),
+        None => {
+            let direction = placement.rotation * (placement.scale * direction);
+            (placement.apply(position), direction.normalize_or_zero())
+        }
+    };
+    let (position_m, direction) = (position.into(), direction.into());
     let colour = |c: DVec3| Some(OneOrThree(c.to_array()));
     let mut written = match kind {
         ImportedLightKind::Point { power } => LightConfig {

@@ -226,6 +226,7 @@ fn read_rectangle<'a>(
         mesh,
         placement,
         is_imported: false,
+        moves: false,
         emitter: Some(Emitter {
             strength: Strength::Power(power),
             faces: vec![EmitterFace::Parallelogram([0, 1, 3])],

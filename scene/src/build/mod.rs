@@ -3,6 +3,7 @@
 mod camera;
 mod imported;
 mod imported_lights;
+mod imported_motion;
 pub(crate) mod lights;
 mod materials;
 mod objects;
@@ -11,7 +12,7 @@ pub(crate) mod sky;
 mod steady_state;
 
 use crate::{
-    animation,
+    animation::{self, Rig},
     bake::{self, Baked, BakedEmitter, Part, Strength},
     bvh::{Holes, SceneBvh},
     config::{Document, Field, LightConfig, SceneConfig},
@@ -63,7 +64,7 @@ impl SceneConfig {
         let document = std::mem::take(&mut self.document);
         let root = Field::root(&document);
         let name = self.name.get_or_insert_with(|| stem(&document)).clone();
-        let animation = animation::read(&mut self, &root)?;
+        let mut animation = animation::read(&mut self, &root)?;
         // A scene is loaded as it is at its beginning.
         animation.write(0.0, &mut self);
         let streaming = settings::streaming(
@@ -81,6 +82,7 @@ impl SceneConfig {
             contents: BTreeMap::new(),
             sky_content: None,
             files: Vec::new(),
+            rigs: Vec::new(),
         };
         let mut notices = Vec::new();
         objects::read(
@@ -114,6 +116,7 @@ impl SceneConfig {
         bvh.set_holes(Holes::find(&geometry, &objects, &materials));
         let sky = lights.iter().position(|l| l.light.shape.sky().is_some()).map(|i| LightId(i as u32));
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
+        animation.carry(inputs.rigs, &objects);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
         notices.extend(steady_state::notice(&features, &objects, &materials));
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents, inputs.sky_content.as_ref());
@@ -150,6 +153,8 @@ impl SceneConfig {
 struct Inputs<'a> {
     /// Files that were read.
     files: Vec<std::path::PathBuf>,
+    /// What moves the parts of imports.
+    rigs: Vec<Rig>,
     parts: BTreeMap<String, Part<'a>>,
     /// Lights without a surface, in the config's coordinates.
     lights: BTreeMap<String, lights::PlainLight>,

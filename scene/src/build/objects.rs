@@ -55,6 +55,7 @@ pub(super) fn read<'a>(
             mesh,
             placement,
             is_imported: false,
+            moves: false,
             emitter: None,
         };
         inputs.parts.insert(name.clone(), part);

@@ -1,7 +1,7 @@
 //! Gathers what a scene file says of the files that objects are imported from.
 
 use super::{ObjectConfig, values};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
 
 /// Which axis of a file points up. The scene's is +Y.
@@ -72,6 +72,55 @@ pub struct GltfConfig {
     pub transmit: Option<Vec<String>>,
     /// Materials of the scene file in the place of the file's, by node, material or `node/material` pair.
     pub materials: Option<BTreeMap<String, String>>,
+    /// The animation that plays, again and again; default the file's first.
+    pub animation: Option<AnimationChoice>,
+    /// Moment at which the animation is held, s; default: it plays.
+    pub animation_time_s: Option<f64>,
+}
+
+/// Which animation of a file plays: its name, or `false` for none.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AnimationChoice {
+    /// The one of this name.
+    Named(String),
+    /// None: everything stands as in the file's nodes.
+    None,
+}
+
+impl Serialize for AnimationChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Named(name) => serializer.serialize_str(name),
+            Self::None => serializer.serialize_bool(false),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for AnimationChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ChoiceVisitor)
+    }
+}
+
+struct ChoiceVisitor;
+
+impl de::Visitor<'_> for ChoiceVisitor {
+    type Value = AnimationChoice;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the name of an animation, or false")
+    }
+
+    fn visit_str<E: de::Error>(self, name: &str) -> Result<AnimationChoice, E> {
+        Ok(AnimationChoice::Named(name.to_owned()))
+    }
+
+    fn visit_bool<E: de::Error>(self, plays: bool) -> Result<AnimationChoice, E> {
+        match plays {
+            false => Ok(AnimationChoice::None),
+            true => Err(E::invalid_value(de::Unexpected::Bool(true), &self)),
+        }
+    }
 }
 
 impl ObjectConfig {

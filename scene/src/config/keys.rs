@@ -51,6 +51,8 @@ fn every_key() -> SceneConfig {
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
             materials: Some([("NAME".into(), "m".into())].into()),
+            animation: Some(AnimationChoice::Named("a".into())),
+            animation_time_s: Some(1.0),
         }),
     };
     let light = LightConfig {

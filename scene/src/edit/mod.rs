@@ -12,6 +12,7 @@ use crate::{
     bvh::Holes,
     config::{Document, Field, MAX_LENGTH_M},
     error::{SceneError, nearest},
+    placement::Placement,
     pose::{self, Pose, RestMesh},
     scene::{Geometry, LightId, MaterialId, Object, ObjectId, Scene},
 };
@@ -125,6 +126,20 @@ impl SceneEdit {
         object::set(self, name, values)
     }
 
+    /// Puts the object called `name` where `placement` says, in the config's coordinates.
+    ///
+    /// # Errors
+    /// If there is no such object, or it comes to lie beyond what f32 can hold.
+    pub(crate) fn set_placement(&mut self, name: &str, placement: &Placement) -> Result<(), SceneError> {
+        let document = Document::default();
+        let table = Field::root(&document).key("object");
+        let Some(id) = self.scene.object(name) else {
+            let known = self.scene.objects.iter().map(|o| o.name.as_str());
+            return Err(unknown_name(&table, "object", name, known));
+        };
+        self.pose_object(id, Pose::new(placement, self.scene.origin_m), &table.key(name))
+    }
+
     /// The edited scene.
     ///
     /// It keeps the triangles that it was loaded with: those without an area at load stay left out, and those that lose
@@ -150,7 +165,7 @@ impl SceneEdit {
             }
             for triangle in object.triangles.clone() {
                 geometry.normals[triangle as usize] = surface::normal(geometry.triangle(triangle))
-                    .or_else(|| turned_normal(geometry.rest_triangle(triangle), pose))
+                    .or_else(|| pose.turned_normal(geometry.rest_triangle(triangle)))
                     .unwrap_or(geometry.normals[triangle as usize]);
             }
         }
@@ -246,11 +261,6 @@ fn resize(
 /// Whether a point is beyond what f32 can hold well, or not finite.
 fn is_far(point: DVec3) -> bool {
     !point.is_finite() || point.abs().max_element() > MAX_LENGTH_M
-}
-
-/// The normal of a triangle that has no area in the scene's space, from rest space.
-fn turned_normal(rest: [Vec3; 3], pose: &Pose) -> Option<Vec3> {
-    surface::normal(rest).and_then(|n| (pose.rotation * n.as_dvec3()).as_vec3().try_normalize())
 }
 
 /// The error of a name that nothing has.

@@ -4,7 +4,7 @@ use crate::{
     config::{Field, UpAxis},
     error::SceneError,
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// The units and axes of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,12 @@ impl Frame {
     /// A point of the file, m.
     pub(crate) fn apply(&self, point: DVec3) -> DVec3 {
         self.turn(point) * self.unit_m
+    }
+
+    /// The map of directions and lengths of the file to those of the scene, m.
+    pub(crate) fn matrix(&self) -> DMat3 {
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| self.apply(axis));
+        DMat3::from_cols(x, y, z)
     }
 
     /// A direction of the file.

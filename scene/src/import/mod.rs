@@ -14,7 +14,7 @@ mod texture;
 pub use assets::AssetRoots;
 pub(crate) use beside::read as read_file;
 pub(crate) use frame::Frame;
-pub(crate) use gltf::{FileCamera, gltf_cameras, load_gltf};
+pub(crate) use gltf::{FileCamera, Played, gltf_cameras, load_gltf};
 pub(crate) use obj::{NO_MATERIAL, load_obj};
 pub(crate) use ply::read_ply;
 pub(crate) use sky_map::read_radiances;
@@ -44,6 +44,10 @@ pub(crate) struct Import {
     pub(crate) material_problem: Option<String>,
     /// Further names that can be left out, and which of them were.
     pub(crate) nodes: BTreeMap<String, LeftOut>,
+    /// Names of its animations, in the file's order.
+    pub(crate) animations: Vec<String>,
+    /// The one that plays; the meshes of nodes that move are in the space of their node and the file's units.
+    pub(crate) played: Option<Played>,
     /// What is passed over of the file, one sentence each.
     pub(crate) notices: Vec<String>,
     /// The same of its materials, without interest where they are replaced.

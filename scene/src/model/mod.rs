@@ -75,6 +75,9 @@ impl ModelScene {
             scene = file.scene()?;
             survey = Survey::of(&scene);
         }
+        if !scene.animation.is_empty() {
+            choices.push("animation: the first of the file plays, again and again".into());
+        }
         let (view, is_inside) = choose_view(&file, &scene, &survey, is_interior, &mut choices);
         choose_sides(&mut file, &scene, &view, &survey, &mut choices);
         let floor = if is_interior { None } else { Floor::below(&scene, &mut choices) };

@@ -142,6 +142,18 @@ proptest! {
             ("/bufferViews/0/byteOffset", json!(0)),
             ("/meshes/0/primitives/0/mode", json!(4)),
             ("/materials/0/emissiveFactor", json!([1, 1, 1])),
+            ("/animations", json!([{
+                "channels": [
+                    { "sampler": 0, "target": { "node": 0, "path": "translation" } },
+                    { "sampler": 0, "target": { "node": 0, "path": "scale" } },
+                ],
+                "samplers": [{ "input": 2, "output": 3 }],
+            }])),
+        ]);
+        // Times 0 and 1 are numbers of the positions, too.
+        file["accessors"].as_array_mut().unwrap().extend([
+            json!({ "bufferView": 0, "byteOffset": 8, "componentType": 5126, "count": 2, "type": "SCALAR" }),
+            json!({ "bufferView": 0, "componentType": 5126, "count": 2, "type": "VEC3" }),
         ]);
         for (at, with) in numbers {
             let mut places = Vec::new();
@@ -157,7 +169,10 @@ proptest! {
         if let Some(cut) = cut {
             bytes.truncate(cut.index(bytes.len()));
         }
-        _ = Files::of_bytes(&bytes).build("", "");
+        if let Ok(scene) = Files::of_bytes(&bytes).build("", "") {
+            // Out of range later on is an error, too.
+            _ = scene.animation.apply(0.5, &mut scene.edit());
+        }
     }
 }
 

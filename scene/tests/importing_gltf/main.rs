@@ -1,6 +1,7 @@
 //! Checks imports of glTF files, one small file for each feature.
 #![allow(clippy::unwrap_used)]
 
+mod animations;
 mod bad;
 mod files;
 mod geometry;

@@ -1,6 +1,7 @@
 //! Turns a glTF 2.0 or GLB file into meshes by node and material, reflectances, emitters and lights.
 
 mod accessor;
+mod animations;
 mod buffers;
 mod cameras;
 mod container;
@@ -15,7 +16,9 @@ use super::{
     Frame, Group, Import, Loaded, MAX_TRIANGLES, Terms,
     beside::{self, Beside},
 };
+use crate::config::AnimationChoice;
 use accessor::Accessors;
+pub(crate) use animations::Played;
 pub(crate) use cameras::{FileCamera, gltf_cameras};
 use container::Container;
 use glam::DVec3;
@@ -27,7 +30,7 @@ use std::{collections::BTreeMap, path::Path};
 const LUMENS_PER_WATT: f64 = 683.0;
 
 /// Reads a glTF or GLB file, and the buffers and pictures it names, without the nodes that `exclude` names and what is
-/// below them.
+/// below them, and with the animation that `animation` asks for.
 ///
 /// Memory is bounded by a constant times the size of the files, and by [`MAX_TRIANGLES`].
 ///
@@ -35,18 +38,29 @@ const LUMENS_PER_WATT: f64 = 683.0;
 /// A sentence on what is wrong with the file at the returned path.
 ///
 /// Source: Khronos Group, *glTF 2.0 Specification*, 2021.
-pub(crate) fn load_gltf(path: &Path, frame: Frame, exclude: &[String]) -> Loaded {
+pub(crate) fn load_gltf(
+    path: &Path,
+    frame: Frame,
+    exclude: &[String],
+    animation: Option<&AnimationChoice>,
+) -> Loaded {
     let bytes = beside::read(path).map_err(|problem| (path.to_owned(), problem))?;
     let beside = Beside::new(path, &bytes);
-    load(&bytes, beside, frame, exclude).map_err(|problem| (path.to_owned(), problem))
+    load(&bytes, beside, frame, (exclude, animation)).map_err(|problem| (path.to_owned(), problem))
 }
 
-fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) -> Result<Import, String> {
+fn load(
+    bytes: &[u8],
+    mut beside: Beside<'_>,
+    frame: Frame,
+    (exclude, animation): (&[String], Option<&AnimationChoice>),
+) -> Result<Import, String> {
     let Container { root, bin } = container::parse(bytes)?;
     let mut notices = unmodelled::check(&root)?;
     let buffers = buffers::load(&root, bin, &mut beside)?;
     let accessors = Accessors { root: &root, buffers: &buffers };
     let placed = nodes::place(&root, exclude)?;
+    let played = animations::read(&root, &accessors, &placed.nodes, animation, &mut notices)?;
 
     let mut materials = Materials::new(&root);
     let mut groups: BTreeMap<(String, String), Group> = BTreeMap::new();
@@ -54,8 +68,13 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
     let mut points_and_lines = 0;
     for node in &placed.nodes {
         let Some(mesh) = root.nodes[node.index].mesh else { continue };
-        let is_mirrored = node.world.matrix3.determinant() < 0.0;
-        let place = |point: DVec3| frame.apply(node.world.transform_point3(point));
+        // Nodes that move keep their mesh in their own space.
+        let moves = played.as_ref().is_some_and(|played| played.joints.contains_key(&node.name));
+        let is_mirrored = !moves && node.world.matrix3.determinant() < 0.0;
+        let place = |point: DVec3| match moves {
+            true => point,
+            false => frame.apply(node.world.transform_point3(point)),
+        };
         for (number, primitive) in root.meshes[mesh.value()].primitives.iter().enumerate() {
             let at = |problem| format!("node \"{}\", primitive {number}: {problem}", node.name);
             if !primitive::is_surface(primitive) {
@@ -68,9 +87,11 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
             if is_mirrored {
                 surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            let normals_to_world = node.world.matrix3.inverse().transpose();
-            for normal in &mut surface.normals {
-                *normal = frame.turn(normals_to_world * *normal);
+            if !moves {
+                let normals_to_world = node.world.matrix3.inverse().transpose();
+                for normal in &mut surface.normals {
+                    *normal = frame.turn(normals_to_world * *normal);
+                }
             }
             for vertex in &mut surface.vertices {
                 *vertex = place(*vertex);
@@ -92,6 +113,8 @@ fn load(bytes: &[u8], mut beside: Beside<'_>, frame: Frame, exclude: &[String]) 
         lights,
         material_problem: None,
         nodes: placed.names,
+        animations: animations::names(&root),
+        played,
         notices,
         material_notices: materials.notices(),
         materials: materials.read,

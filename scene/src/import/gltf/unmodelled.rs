@@ -47,7 +47,6 @@ pub(super) fn check(root: &Root) -> Result<Vec<String>, String> {
             .any(|key| matches!(key, Checked::Valid(gltf::json::mesh::Semantic::Colors(_))))
     });
     for (is_there, what) in [
-        (!root.animations.is_empty(), "animations are not read: it stands as in its nodes"),
         (!root.skins.is_empty(), "skins are not read: meshes stand as they were modelled"),
         (
             primitives().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty())),

@@ -76,6 +76,8 @@ pub(crate) fn load_obj(path: &Path, frame: Frame) -> Loaded {
         lights: Vec::new(),
         material_problem,
         nodes: BTreeMap::new(),
+        animations: Vec::new(),
+        played: None,
         notices: notices.collect(),
         material_notices,
         files: beside.files,
