@@ -75,7 +75,7 @@ fn misspelt_keys_name_the_nearest() {
 
 #[test]
 fn missing_keys_are_named_with_their_table() {
-    check("target_m = [0, 1, 0]\n", "", ":1:1: camera: the key \"target_m\" is missing; add it");
+    check("target_m = [0, 1, 0]\n", "", ":1:2: camera: the key \"target_m\" is missing; add it");
     check("radius_m = 1, ", "", ":11:10: object.ball.sphere: the key \"radius_m\" is missing");
     check("material = \"white\"\n", "", ":9:9: object.ball: the key \"material\" is missing");
     check("power_w = 10\n", "", ":13:8: light.lamp: the key \"power_w\" is missing");

@@ -12,12 +12,14 @@ pub(super) fn camera(
     field: &Field<'_>,
     origin: DVec3,
 ) -> Result<Camera, SceneError> {
-    let position = field.key("position_m").metres(config.position_m)?;
-    let target = field.key("target_m").metres(config.target_m)?;
+    let missing = |key: &str| field.missing(key);
+    let position = config.position_m.ok_or_else(|| missing("position_m"))?;
+    let position = field.key("position_m").metres(position)?;
+    let target = field.key("target_m").metres(config.target_m.ok_or_else(|| missing("target_m"))?)?;
     let up_config = *config.up.get_or_insert(Vector([0.0, 1.0, 0.0]));
     let up = field.key("up").direction(up_config)?;
     let fov = field.key("vertical_fov_deg").number(
-        config.vertical_fov_deg,
+        config.vertical_fov_deg.ok_or_else(|| missing("vertical_fov_deg"))?,
         "an angle of at least 0.001 and below 180 degrees",
         |x| (0.001..180.0).contains(&x),
     )?;

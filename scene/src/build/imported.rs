@@ -1,13 +1,15 @@
 //! Turns an object that imports an OBJ or glTF file into one part for each group and material of the file.
 
 use super::{
-    Inputs, imported_lights,
+    Inputs,
+    imported_cameras::PlacedCamera,
+    imported_lights::{self, Overrides},
     imported_motion::{Motion, resolve_choice},
     materials::Materials,
 };
 use crate::{
     bake::{Emitter, EmitterFace, Part, Strength},
-    config::{AnimationChoice, Field, GltfConfig, ObjConfig, ObjectConfig},
+    config::{AnimationChoice, Field, GltfConfig, LightOverride, ObjConfig, ObjectConfig},
     error::{SceneError, nearest},
     import::{AssetRoots, Frame, Group, Import, ImportedMaterial, LeftOut, Terms, load_gltf, load_obj},
     placement::Placement,
@@ -44,8 +46,15 @@ struct Table<'c, 'a> {
     frame: Frame,
     smooth: bool,
     field: Field<'a>,
-    /// Which animation plays, and at what moment it is held; of files that can have some.
-    animation: Option<(&'c mut Option<AnimationChoice>, Option<f64>)>,
+    /// Of files with lights and animations.
+    stage: Option<Stage<'c>>,
+}
+
+/// What a table says of lights and motion.
+struct Stage<'c> {
+    animation: &'c mut Option<AnimationChoice>,
+    held_s: Option<f64>,
+    lights: Option<&'c BTreeMap<String, LightOverride>>,
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
@@ -61,11 +70,11 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
             frame,
             smooth: *smooth.get_or_insert(true),
             field,
-            animation: None,
+            stage: None,
         });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, .. } = gltf;
+    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, lights, .. } = gltf;
     let (animation, held_s) = (&mut gltf.animation, gltf.animation_time_s);
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
@@ -75,8 +84,8 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
     }
     let materials = materials.as_ref();
     let smooth = *smooth.get_or_insert(true);
-    let animation = Some((animation, held_s));
-    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, animation })
+    let stage = Some(Stage { animation, held_s, lights: lights.as_ref() });
+    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, stage })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -108,13 +117,13 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, transmit, materials, frame, smooth, field, animation } =
+    let Table { path, exclude, transmit, materials, frame, smooth, field, stage } =
         table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
     let asset_error = |asset, problem, remedy| asset_error(&path_field, asset, problem, remedy);
-    let loaded = match &animation {
-        Some((choice, _)) => load_gltf(&file, frame, exclude, choice.as_ref()),
+    let loaded = match &stage {
+        Some(stage) => load_gltf(&file, frame, exclude, stage.animation.as_ref()),
         None => load_obj(&file, frame),
     };
     let import = loaded
@@ -137,11 +146,12 @@ pub(super) fn read(
         import.notices.iter().chain(of_materials).map(|notice| format!("object \"{name}\": {notice}"));
     context.notices.extend(notices);
 
-    let mut motion = None;
-    if let Some((choice, held_s)) = animation {
-        resolve_choice(choice, &import.animations, &field.key("animation"))?;
+    let (mut motion, mut changed_lights) = (None, None);
+    if let Some(Stage { animation, held_s, lights }) = stage {
+        resolve_choice(animation, &import.animations, &field.key("animation"))?;
         let note = |notice| context.notices.push(format!("object \"{name}\": {notice}"));
         motion = import.played.map(|played| Motion::new(played, frame, placement, held_s, note));
+        changed_lights = lights;
     }
     let mut parts = Vec::new();
     for ((group, material), mut content) in import.groups {
@@ -171,9 +181,14 @@ pub(super) fn read(
     }
     limit_emitters(&mut parts, context.notices);
     context.inputs.parts.extend(parts.into_iter().map(|part| (part.name.clone(), part)));
+    let overrides = Overrides::new(changed_lights, &import.lights, field.key("lights"))?;
     for light in import.lights {
-        let name = format!("{name}/{}", light.node);
-        imported_lights::add(name, light, (placement, motion.as_mut()), context.field, context.inputs)?;
+        imported_lights::add(name, light, (placement, motion.as_mut()), &overrides, context.inputs)?;
+    }
+    for camera in import.cameras {
+        let name = format!("{name}/{}", camera.node);
+        let placed = PlacedCamera::new(camera, &placement, motion.as_ref());
+        context.inputs.cameras.insert(name, placed);
     }
     if let Some(motion) = motion {
         motion.finish(name, context.inputs);

@@ -82,6 +82,11 @@ impl Motion {
         Some(self.worlds[joint])
     }
 
+    /// Where a node is as the scene is loaded, if it moves: from its space to the import's.
+    pub(super) fn world(&self, node: &str) -> Option<DAffine3> {
+        self.joints.get(node).map(|joint| self.worlds[*joint])
+    }
+
     /// Hands over what moves later.
     pub(super) fn finish(self, import: &str, inputs: &mut Inputs<'_>) {
         let Self { skeleton, import: placement, is_held, riders, .. } = self;

@@ -2,6 +2,7 @@
 
 mod camera;
 mod imported;
+mod imported_cameras;
 mod imported_lights;
 mod imported_motion;
 pub(crate) mod lights;
@@ -83,6 +84,7 @@ impl SceneConfig {
             sky_content: None,
             files: Vec::new(),
             rigs: Vec::new(),
+            cameras: BTreeMap::new(),
         };
         let mut notices = Vec::new();
         objects::read(
@@ -104,6 +106,7 @@ impl SceneConfig {
             None => bake::snapped_centre(bake::bounding_box(&parts)),
         };
         self.origin_m = Some(origin_m.into());
+        imported_cameras::resolve(&mut self.camera, &inputs.cameras, &root.key("camera"))?;
         let camera = camera::camera(&mut self.camera, &root.key("camera"), origin_m)?;
         let materials = materials.into_list();
         let baked = bake::bake(parts, origin_m, &materials)?;
@@ -155,6 +158,8 @@ struct Inputs<'a> {
     files: Vec<std::path::PathBuf>,
     /// What moves the parts of imports.
     rigs: Vec<Rig>,
+    /// Cameras of imported files, by the names of object and node.
+    cameras: BTreeMap<String, imported_cameras::PlacedCamera>,
     parts: BTreeMap<String, Part<'a>>,
     /// Lights without a surface, in the config's coordinates.
     lights: BTreeMap<String, lights::PlainLight>,

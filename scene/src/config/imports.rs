@@ -1,6 +1,6 @@
 //! Gathers what a scene file says of the files that objects are imported from.
 
-use super::{ObjectConfig, values};
+use super::{ObjectConfig, OneOrThree, values};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
 
@@ -72,10 +72,24 @@ pub struct GltfConfig {
     pub transmit: Option<Vec<String>>,
     /// Materials of the scene file in the place of the file's, by node, material or `node/material` pair.
     pub materials: Option<BTreeMap<String, String>>,
+    /// What is otherwise than in the file, of the lights of nodes by the name of the node.
+    pub lights: Option<BTreeMap<String, LightOverride>>,
     /// The animation that plays, again and again; default the file's first.
     pub animation: Option<AnimationChoice>,
     /// Moment at which the animation is held, s; default: it plays.
     pub animation_time_s: Option<f64>,
+}
+
+/// What of a light of a file is otherwise than there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightOverride {
+    /// Emitted power, W, linear RGB, of a point or spot light.
+    pub power_w: Option<OneOrThree>,
+    /// Irradiance of a surface that faces it, W m⁻², linear RGB, of a directional light.
+    pub irradiance_w_m2: Option<OneOrThree>,
+    /// Whether it is left out; what else its node has stays.
+    pub exclude: Option<bool>,
 }
 
 /// Which animation of a file plays: its name, or `false` for none.

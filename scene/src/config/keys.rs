@@ -51,6 +51,10 @@ fn every_key() -> SceneConfig {
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
             materials: Some([("NAME".into(), "m".into())].into()),
+            lights: Some(
+                [("NAME".into(), LightOverride { power_w: c, irradiance_w_m2: c, exclude: Some(true) })]
+                    .into(),
+            ),
             animation: Some(AnimationChoice::Named("a".into())),
             animation_time_s: Some(1.0),
         }),
@@ -99,7 +103,13 @@ fn every_key() -> SceneConfig {
     SceneConfig {
         name: Some("n".into()),
         origin_m: Some(v),
-        camera: CameraConfig { position_m: v, target_m: v, up: Some(v), vertical_fov_deg: 1.0 },
+        camera: CameraConfig {
+            node: Some("n".into()),
+            position_m: Some(v),
+            target_m: Some(v),
+            up: Some(v),
+            vertical_fov_deg: Some(1.0),
+        },
         material: [("NAME".into(), MaterialConfig { albedo: OneOrThree([0.5; 3]) })].into(),
         object: [("NAME".into(), object)].into(),
         light: [("NAME".into(), light)].into(),

@@ -13,7 +13,7 @@ mod values;
 pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
 pub use domain::{MAX_LENGTH_M, MAX_POWER};
-pub use imports::{AnimationChoice, GltfConfig, ObjConfig, PlyConfig, UpAxis};
+pub use imports::{AnimationChoice, GltfConfig, LightOverride, ObjConfig, PlyConfig, UpAxis};
 pub use sky::SkyConfig;
 pub use values::{OneOrThree, Vector};
 
@@ -60,18 +60,20 @@ pub struct SceneConfig {
     pub(crate) chosen: Vec<String>,
 }
 
-/// `[camera]`: a pinhole camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// `[camera]`: a pinhole camera; where it is, or the node of an import that is one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraConfig {
+    /// The camera of a file that an object imports: `OBJECT/node`.
+    pub node: Option<String>,
     /// Where the eye is, m.
-    pub position_m: Vector,
+    pub position_m: Option<Vector>,
     /// A point in the middle of the picture, m.
-    pub target_m: Vector,
+    pub target_m: Option<Vector>,
     /// Which way is up in the picture; default +Y.
     pub up: Option<Vector>,
-    /// Field of view from bottom to top.
-    pub vertical_fov_deg: f64,
+    /// Field of view from bottom to top; default that of the node.
+    pub vertical_fov_deg: Option<f64>,
 }
 
 /// `[material.NAME]`: a diffuse reflectance.

@@ -40,6 +40,8 @@ pub(crate) struct Import {
     pub(crate) materials: BTreeMap<String, ImportedMaterial>,
     /// Lights without a surface.
     pub(crate) lights: Vec<ImportedLight>,
+    /// Perspective cameras, m.
+    pub(crate) cameras: Vec<FileCamera>,
     /// What could not be read of the material files; faces may lack their material.
     pub(crate) material_problem: Option<String>,
     /// Further names that can be left out, and which of them were.

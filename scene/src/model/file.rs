@@ -98,10 +98,10 @@ impl ModelFile {
     /// If it is no valid model.
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
         let camera = CameraConfig {
-            position_m: Vector([0.0, 0.0, 1.0]),
-            target_m: Vector::default(),
-            up: None,
-            vertical_fov_deg: 40.0,
+            position_m: Some(Vector([0.0, 0.0, 1.0])),
+            target_m: Some(Vector::default()),
+            vertical_fov_deg: Some(40.0),
+            ..Default::default()
         };
         let text = toml::to_string(&camera).expect("invariant: numbers are TOML");
         let mut config =

@@ -3,6 +3,7 @@
 
 mod animations;
 mod bad;
+mod cameras;
 mod files;
 mod geometry;
 mod surfaces;

@@ -122,6 +122,51 @@ fn lights_come_in_watts_and_follow_their_node() {
     );
 }
 
+/// Strengths of the scene file in the place of the file's, and one light less.
+#[test]
+fn lights_are_changed_and_left_out_by_node() {
+    let lamp = |light: u32| json!({ "KHR_lights_punctual": { "light": light } });
+    let files = Files::new(&with(&[
+        ("/extensionsUsed", json!(["KHR_lights_punctual"])),
+        (
+            "/extensions",
+            json!({ "KHR_lights_punctual": { "lights": [{ "type": "point" }, { "type": "directional" }] } }),
+        ),
+        ("/scenes/0/nodes", json!([0, 1, 2])),
+        (
+            "/nodes",
+            json!([
+                { "name": "square", "mesh": 0, "extensions": lamp(0) },
+                { "name": "sun", "extensions": lamp(1) },
+                { "name": "bulb", "extensions": lamp(0) },
+            ]),
+        ),
+    ]));
+    let lights = |keys: &str| files.build("", &format!(", lights = {{ {keys} }}"));
+    let scene = lights(
+        "square = { exclude = true }, sun = { irradiance_w_m2 = 3 }, bulb = { power_w = [1, 2, 3], exclude = false }",
+    )
+    .unwrap();
+    assert_eq!(names(&scene), ["it/square/paint"]);
+    assert_eq!(scene.lights.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["it/bulb", "it/sun"]);
+    assert_eq!(light(&scene, "it/sun").power, Vec3::splat(3.0));
+    assert_eq!(light(&scene, "it/bulb").power, Vec3::new(1.0, 2.0, 3.0));
+    let again = Scene::from_resolved(&scene.resolved_text).unwrap();
+    assert_eq!((again.hash, &again.lights), (scene.hash, &scene.lights));
+    for (keys, expected) in [
+        (
+            "blub = { power_w = 1 }",
+            "lights.blub: no node with a light is called \"blub\", did you mean \"bulb\"?",
+        ),
+        ("sun = { power_w = 1 }", "lights.sun.power_w: found power_w, expected irradiance_w_m2"),
+        ("bulb = { power_w = -1 }", "lights.bulb.power_w: found [-1, -1, -1]"),
+        ("bulb = { watts = 1 }", "unknown key \"watts\""),
+    ] {
+        let error = lights(keys).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}\n{expected}");
+    }
+}
+
 #[test]
 fn double_sided_materials_reflect_on_both_sides_unless_told_otherwise() {
     let files = Files::new(&with(&[("/materials/0/doubleSided", json!(true))]));

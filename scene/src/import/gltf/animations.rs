@@ -77,9 +77,6 @@ pub(super) fn read(
                 node.name
             ));
         }
-        if root.nodes[node.index].camera.is_some() {
-            notices.push(format!("animation \"{name}\": the camera of node \"{}\" stands still", node.name));
-        }
         let still = node.parent.map_or(DAffine3::IDENTITY, |parent| nodes[parent].world);
         by_name.insert(node.name.clone(), joints.len());
         joint_of.push(Some(joints.len()));

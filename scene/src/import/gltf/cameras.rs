@@ -1,9 +1,12 @@
 //! Turns the perspective cameras of a glTF file into places, directions and angles in metres with +Y up.
 
-use super::{container, nodes};
+use super::{
+    container,
+    nodes::{self, Placed},
+};
 use crate::import::{Frame, beside};
 use glam::DVec3;
-use gltf::json::camera::Type;
+use gltf::json::{Root, camera::Type};
 use std::path::Path;
 
 /// A perspective camera of a file, m.
@@ -21,15 +24,19 @@ pub(crate) struct FileCamera {
     pub(crate) aspect_ratio: Option<f64>,
 }
 
-/// The perspective cameras of the scene, in the order of its nodes; others are passed over.
+/// The perspective cameras of a file, as [`read`] gives them, with all nodes.
 ///
 /// # Errors
 /// A sentence on what is wrong with the file.
 pub(crate) fn gltf_cameras(path: &Path, frame: Frame) -> Result<Vec<FileCamera>, String> {
     let bytes = beside::read(path)?;
     let root = container::parse(&bytes)?.root;
-    let nodes = nodes::place(&root, &[])?.nodes;
-    let cameras = nodes.into_iter().filter_map(|node| {
+    Ok(read(&root, &nodes::place(&root, &[])?.nodes, frame))
+}
+
+/// The perspective cameras of `nodes`, in their order; others are passed over.
+pub(super) fn read(root: &Root, nodes: &[Placed], frame: Frame) -> Vec<FileCamera> {
+    let cameras = nodes.iter().filter_map(|node| {
         let camera = root.cameras.get(root.nodes[node.index].camera?.value())?;
         if !matches!(camera.type_.as_ref(), gltf::json::validation::Checked::Valid(Type::Perspective)) {
             return None;
@@ -42,8 +49,8 @@ pub(crate) fn gltf_cameras(path: &Path, frame: Frame) -> Result<Vec<FileCamera>,
             up: turned(DVec3::Y)?,
             vertical_fov_deg: f64::from(perspective.yfov).to_degrees(),
             aspect_ratio: perspective.aspect_ratio.map(f64::from).filter(|aspect| *aspect > 0.0),
-            node: node.name,
+            node: node.name.clone(),
         })
     });
-    Ok(cameras.collect())
+    cameras.collect()
 }

@@ -111,6 +111,7 @@ fn load(
         terms: Terms { albedo: "baseColorFactor", radiance: "emissiveFactor" },
         groups,
         lights,
+        cameras: cameras::read(&root, &placed.nodes, frame),
         material_problem: None,
         nodes: placed.names,
         animations: animations::names(&root),

@@ -74,6 +74,7 @@ pub(crate) fn load_obj(path: &Path, frame: Frame) -> Loaded {
         groups,
         materials: imported,
         lights: Vec::new(),
+        cameras: Vec::new(),
         material_problem,
         nodes: BTreeMap::new(),
         animations: Vec::new(),
