@@ -79,6 +79,37 @@ fn text_and_binary_of_both_byte_orders_are_the_same_mesh() {
     assert!(scene.hash != little.hash && little.hash != big.hash);
 }
 
+/// A strip of three triangles and, after a restart, one of a single one; in text and in binary.
+#[test]
+fn strips_are_triangles() {
+    let header = "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+        element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    let points = [[0, 0], [1, 0], [0, 1], [1, 1], [0, 2]];
+    let strip = [0i32, 1, 2, 3, 4, -1, 0, 3, 4];
+    let mut text = format!("ply\nformat ascii 1.0\n{header}");
+    points.iter().for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
+    let words: Vec<_> = strip.iter().map(i32::to_string).collect();
+    text += &format!("9 {}\n", words.join(" "));
+    let mut binary = format!("ply\nformat binary_big_endian 1.0\n{header}").into_bytes();
+    for [x, y] in points {
+        [x, y, 0].iter().for_each(|n| binary.extend((*n as f32).to_be_bytes()));
+    }
+    [9].iter().chain(&strip).for_each(|n| binary.extend(n.to_be_bytes()));
+    for bytes in [text.as_bytes(), &binary] {
+        let scene = build(bytes).unwrap();
+        assert_eq!(*scene.geometry.triangles, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [0, 3, 4]]);
+        // All look the same way.
+        assert!(scene.geometry.normals.iter().all(|n| *n == Vec3::Z));
+    }
+    let error = build(text.replace("-1 0 3 4", "-1 0 3 5").as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("face 3 names vertex 5, but there are 5"), "{error}");
+    let error = build(text.replace("-1 0 3 4", "-1 0 3 -4").as_bytes()).unwrap_err().to_string();
+    assert!(
+        error.contains("element \"tristrips\" 0 of 1: found corner -4, expected a number from 0"),
+        "{error}"
+    );
+}
+
 #[test]
 fn axes_and_units_are_those_of_the_scene() {
     for (keys, at) in [
@@ -118,7 +149,7 @@ fn bad_files_are_explained() {
         (text.replace("property double y\n", ""), "element \"vertex\" has no number \"y\""),
         (
             text.replace("vertex_indices", "corners"),
-            "it has no element \"face\" with a list \"vertex_indices\"",
+            "it has no element \"face\" or \"tristrips\" with a list \"vertex_indices\"",
         ),
         (text.replace("1 3 0 1 4", "1 3 0 1 5"), "face 1 names vertex 5, but there are 5, counted from 0"),
         (text.replace("1 3 0 1 4", "1 3 0 1 -4"), "element \"face\" 1 of 2: "),

@@ -7,6 +7,7 @@ mod gltf;
 mod obj;
 mod pictures;
 mod ply;
+mod ply_strips;
 mod polygons;
 mod sky_map;
 mod texture;

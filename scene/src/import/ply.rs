@@ -1,6 +1,11 @@
 //! Turns a PLY file into a mesh: positions and polygons, in text or binary of either byte order.
 
-use super::{Frame, Group, MAX_TRIANGLES, polygons::push_polygon, unit};
+use super::{
+    Frame, Group, MAX_TRIANGLES,
+    ply_strips::{self, Strips},
+    polygons::push_polygon,
+    unit,
+};
 use crate::primitives::Mesh;
 use glam::DVec3;
 use ply_rs_bw::{
@@ -12,8 +17,8 @@ use ply_rs_bw::{
 };
 use std::io::BufRead;
 
-/// Reads the faces of a PLY file. Properties other than `x`, `y`, `z`, `nx`, `ny`, `nz` and `vertex_indices` (or
-/// `vertex_index`) are passed over.
+/// Reads the faces and triangle strips of a PLY file. Properties other than `x`, `y`, `z`, `nx`, `ny`, `nz` and
+/// `vertex_indices` (or `vertex_index`) are passed over.
 ///
 /// What is allocated is bounded by the length of `bytes`, whatever counts they name.
 ///
@@ -33,16 +38,12 @@ pub(crate) fn read_ply(bytes: &[u8], frame: Frame) -> Result<Mesh, String> {
             _ => return Err(format!("element \"vertex\" has no number \"{property}\"")),
         }
     }
-    let faces = header.elements.get("face").filter(|element| {
-        element
-            .properties
-            .iter()
-            .any(|(name, p)| is_corner_list(name) && matches!(p.data_type, PropertyType::List(..)))
-    });
-    if faces.is_none() {
-        let strips =
-            if header.elements.contains_key("tristrips") { "; triangle strips are not read" } else { "" };
-        return Err(format!("it has no element \"face\" with a list \"vertex_indices\"{strips}"));
+    let has_corners = |element: &ElementDef| {
+        let properties = &mut element.properties.iter();
+        properties.any(|(name, p)| is_corner_list(name) && matches!(p.data_type, PropertyType::List(..)))
+    };
+    if !["face", "tristrips"].iter().filter_map(|name| header.elements.get(*name)).any(has_corners) {
+        return Err("it has no element \"face\" or \"tristrips\" with a list \"vertex_indices\"".into());
     }
     let has_normals = header
         .elements
@@ -64,6 +65,13 @@ pub(crate) fn read_ply(bytes: &[u8], frame: Frame) -> Result<Mesh, String> {
                 let face = face.0?;
                 arities.push(face.len());
                 corners.extend(face);
+                Ok(())
+            })?,
+            "tristrips" => payload.each(element, |strips: Strips| {
+                for triangle in ply_strips::triangles(&strips.0?)? {
+                    arities.push(3);
+                    corners.extend(triangle);
+                }
                 Ok(())
             })?,
             _ => payload.each(element, |_: Skipped| Ok(()))?,
@@ -97,7 +105,7 @@ fn not_valid(error: &ParseError) -> String {
     format!("not a valid PLY file: {text}")
 }
 
-fn is_corner_list(name: &str) -> bool {
+pub(super) fn is_corner_list(name: &str) -> bool {
     name == "vertex_indices" || name == "vertex_index"
 }
 
