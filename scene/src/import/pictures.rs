@@ -1,6 +1,5 @@
 //! Turns the picture files that an import names into pictures, each once, within a bound on all of them together.
 
-use super::texture;
 use crate::picture::Picture;
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -21,7 +20,7 @@ impl<K: Ord + Clone> Pictures<K> {
         Self { read: BTreeMap::new(), pixels: 0, full: 0, notices: Vec::new() }
     }
 
-    /// The picture `key`, called `name` in messages, of which `content` reads the file; with `holes`, its alpha counts.
+    /// The picture `key`, called `name` in messages, as `read` gives it; with `holes`, its alpha counts.
     ///
     /// # Errors
     /// What is wrong with the file.
@@ -30,12 +29,11 @@ impl<K: Ord + Clone> Pictures<K> {
         key: K,
         holes: bool,
         name: &str,
-        content: impl FnOnce() -> Result<Vec<u8>, String>,
+        read: impl FnOnce() -> Result<Picture, String>,
     ) -> Result<Arc<Picture>, String> {
         let key = (key, holes);
         if !self.read.contains_key(&key) {
-            let picture = content().and_then(|bytes| texture::read(&bytes, holes));
-            let picture = picture.map(|picture| self.keep(picture, name));
+            let picture = read().map(|picture| self.keep(picture, name));
             self.read.insert(key.clone(), picture);
         }
         self.read[&key].clone()

@@ -2,7 +2,7 @@
 
 use super::{Beside, LUMENS_PER_WATT, accessor::Accessors, buffers::read_uri, names, primitive::Uvs};
 use crate::{
-    import::{ImportedMaterial, NO_MATERIAL, pictures::Pictures},
+    import::{ImportedMaterial, NO_MATERIAL, pictures::Pictures, texture::decode},
     picture::{Picture, Texture},
 };
 use glam::{DAffine2, DVec2, DVec3};
@@ -157,14 +157,15 @@ impl<'a> Materials<'a> {
         let image = self.root.textures[texture.value()].source.value();
         let picture = &self.root.images[image];
         let view = picture.buffer_view.map(|view| accessors.view(view)).transpose()?;
-        let content = || match (view, &picture.uri) {
+        let mut content = || match (view, &picture.uri) {
             (Some(bytes), _) => Ok(bytes.to_vec()),
             (None, Some(uri)) => read_uri(uri, beside),
             (None, None) => Err("it has neither uri nor buffer view".into()),
         };
         let label =
             picture.name.as_ref().map_or_else(|| image.to_string(), |name| format!("{image} \"{name}\""));
-        Ok(match self.pictures.get(image, holes, &label, content) {
+        let read = || Ok(decode(&content()?)?.picture(holes));
+        Ok(match self.pictures.get(image, holes, &label, read) {
             Ok(picture) => Some(picture),
             Err(problem) => {
                 self.notices.insert(format!(

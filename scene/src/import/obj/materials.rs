@@ -2,7 +2,7 @@
 
 use super::{Beside, Pictures};
 use crate::{
-    import::ImportedMaterial,
+    import::{ImportedMaterial, texture::decode},
     picture::{Picture, Texture},
 };
 use glam::{DAffine2, DVec2, DVec3};
@@ -50,7 +50,7 @@ fn complete_colours(text: &str) -> Result<String, String> {
 /// The materials of MTL files, with each picture read once.
 pub(super) struct Surfaces<'p> {
     pub(super) beside: Beside<'p>,
-    pub(super) pictures: Pictures<String>,
+    pub(super) pictures: Pictures<[Option<String>; 2]>,
     pub(super) notices: Vec<String>,
 }
 
@@ -60,30 +60,11 @@ impl Surfaces<'_> {
         let vector =
             |v: Option<[f32; 3]>, default| v.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
         let albedo = vector(material.diffuse, DVec3::ONE);
-        let (mut texture, mut map) = (None, None);
-        if let Some(line) = &material.diffuse_texture {
-            let colour = Map::read(line);
-            let mask = material.dissolve_texture.as_deref().map(Map::read);
-            if mask.as_ref().is_some_and(|mask| mask.name != colour.name) {
-                self.note(format!(
-                    "material \"{}\": map_d is read only where it names the picture of map_Kd, whose alpha then counts",
-                    material.name
-                ));
-            }
-            let holes = mask.is_some_and(|mask| mask.name == colour.name);
-            match self.picture(colour.name, holes) {
-                Ok(picture) => {
-                    texture = Some(Texture::new(picture, [colour.wrap; 2], holes.then_some(CUTOFF)));
-                    map = Some(colour.transform);
-                }
-                Err(problem) => {
-                    self.note(format!("material \"{}\": texture {problem}; Kd is used alone", material.name));
-                }
-            }
-        }
-        if material.dissolve.is_some_and(|d| d < 1.0) {
+        let dissolve = dissolve(material);
+        let (texture, map) = self.texture(material, dissolve).unzip();
+        if dissolve < 1.0 && texture.as_ref().is_none_or(|texture: &Texture| texture.cutoff.is_none()) {
             self.note(format!(
-                "material \"{}\": d is not read: it is opaque; `transmit` lets light pass",
+                "material \"{}\": d = {dissolve} is not read: it is opaque; `transmit` lets light pass",
                 material.name
             ));
         }
@@ -97,13 +78,79 @@ impl Surfaces<'_> {
         }
     }
 
-    fn picture(&mut self, name: &str, holes: bool) -> Result<Arc<Picture>, String> {
-        let Self { beside, pictures, .. } = self;
-        let mut is_there = false;
-        let content = || beside.read(name).inspect(|_| is_there = true);
-        let picture = pictures.get(name.to_owned(), holes, &format!("\"{name}\""), content);
-        picture.map_err(|e| if is_there { format!("\"{name}\" is no picture ({e})") } else { e })
+    /// The picture of a material, with holes where `map_d` says, and the map to its coordinates.
+    fn texture(&mut self, material: &tobj::Material, dissolve: f32) -> Option<(Texture, DAffine2)> {
+        let mut note = |problem: String| self.note(format!("material \"{}\": {problem}", material.name));
+        let colour = material.diffuse_texture.as_deref().map(Map::read);
+        let mut mask = material.dissolve_texture.as_deref().map(Map::read);
+        if let (Some(colour), Some(of_mask)) = (&colour, &mask)
+            && colour.name != of_mask.name
+            && (colour.transform, colour.wrap) != (of_mask.transform, of_mask.wrap)
+        {
+            note("map_d is not read: its -s, -o or -clamp are others than those of map_Kd".into());
+            mask = None;
+        }
+        let name = |map: &Option<Map<'_>>| map.as_ref().map(|map| map.name.to_owned());
+        let mut names = [name(&colour), name(&mask)];
+        if names.iter().all(Option::is_none) {
+            return None;
+        }
+        let mut has_holes = mask.is_some();
+        let mut picture = self.picture(&names);
+        if let (Err(problem), [Some(_), Some(_)]) = (&picture, &names) {
+            // One of two can stand alone.
+            self.note(format!("material \"{}\": texture {problem}", material.name));
+            for alone in [[names[0].clone(), None], [None, names[1].clone()]] {
+                if picture.is_err() {
+                    has_holes = alone[1].is_some();
+                    picture = self.picture(&alone);
+                    names = alone;
+                }
+            }
+        }
+        match picture {
+            Ok(picture) => {
+                let map = if names[0].is_some() { colour } else { mask };
+                let map = map?;
+                // The picture's alpha counts times `d`.
+                let cutoff = has_holes.then_some(CUTOFF / dissolve);
+                Some((Texture::new(picture, [map.wrap; 2], cutoff), map.transform))
+            }
+            Err(problem) => {
+                self.note(format!("material \"{}\": texture {problem}; Kd is used alone", material.name));
+                None
+            }
+        }
     }
+
+    /// The picture of these colours with holes by that mask.
+    fn picture(&mut self, names: &[Option<String>; 2]) -> Result<Arc<Picture>, String> {
+        let Self { beside, pictures, .. } = self;
+        let mut decoded = |name: &str| {
+            let bytes = beside.read(name)?;
+            decode(&bytes).map_err(|e| format!("\"{name}\" is no picture ({e})"))
+        };
+        let label =
+            names.iter().flatten().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" with ");
+        let read = || match names {
+            [Some(colour), Some(mask)] if colour != mask => {
+                let colour = decoded(colour)?;
+                decoded(mask)?.masking(Some(&colour))
+            }
+            [Some(colour), mask] => Ok(decoded(colour)?.picture(mask.is_some())),
+            [None, Some(mask)] => decoded(mask)?.masking(None),
+            [None, None] => Err("none".into()),
+        };
+        let holes = names[1].is_some();
+        pictures.get(names.clone(), holes, &label, read)
+    }
+}
+
+/// How opaque a material is: `d`, else 1 less `Tr`; 1 where neither is a share.
+fn dissolve(material: &tobj::Material) -> f32 {
+    let through = material.unknown_param.get("Tr").and_then(|text| text.trim().parse::<f32>().ok());
+    let d = material.dissolve.or(through.map(|through| 1.0 - through)).unwrap_or(1.0);
+    if (0.0..=1.0).contains(&d) { d } else { 1.0 }
 }
 
 /// What a `map_` line says: options, then the name of a file.
