@@ -1,5 +1,6 @@
 //! Turns one query into code for the best instruction set that the running processor has.
 
+use glam::vec3;
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::V3;
 use pulp::{Simd, WithSimd};
@@ -10,6 +11,7 @@ use super::lanes_x86::Avx2;
 use super::ray_frame::RayFrame;
 use super::scene_bvh::{Part, SceneBvh};
 use super::triangle::Nearest;
+use super::{Hit, Ray};
 use super::walk::{Leaves, RayLanes, Stack, walk};
 
 /// What the kernels are compiled for; holding a variant proves that the processor has it.
@@ -49,38 +51,102 @@ impl Instructions {
     }
 
     #[inline(always)]
-    pub(super) fn run<const ANY: bool>(self, query: Query<'_, ANY>) -> Nearest {
+    pub(super) fn run<const ANY: bool>(self, query: Query<'_, ANY>) -> Answer {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => Simd::vectorize(simd, With(Avx2(simd), query)),
-            Self::Portable => query.run(Portable),
+            Self::Portable => run_portable(query),
         }
     }
 }
 
-/// One ray against one scene.
+/// Not inlined, so that what chooses is small.
+#[inline(never)]
+fn run_portable<const ANY: bool>(query: Query<'_, ANY>) -> Answer {
+    query.run(Portable)
+}
+
+/// One ray against one scene, in six registers, as the answer is in two: a ray costs as little as 100 ns, and to load as a
+/// whole what was stored in parts waits for the ray before to be finished.
 pub(super) struct Query<'a, const ANY: bool> {
     pub(super) scene: &'a SceneBvh,
-    pub(super) frame: &'a RayFrame,
     pub(super) stack: &'a mut Stack,
+    /// Origin, direction and `t_max`: pairs that are never an array in memory.
+    ox_oy: u64,
+    oz_dx: u64,
+    dy_dz: u64,
+    t_max: f32,
+}
+
+impl<'a, const ANY: bool> Query<'a, ANY> {
+    #[inline(always)]
+    pub(super) fn new(scene: &'a SceneBvh, stack: &'a mut Stack, ray: &Ray) -> Self {
+        let (o, d) = (ray.origin, ray.direction);
+        let (ox_oy, oz_dx, dy_dz) = (pair(o.x, o.y), pair(o.z, d.x), pair(d.y, d.z));
+        Self { scene, stack, ox_oy, oz_dx, dy_dz, t_max: ray.t_max }
+    }
+
+    #[inline(always)]
+    fn ray(&self) -> Ray {
+        let ((ox, oy), (oz, dx), (dy, dz)) = (unpair(self.ox_oy), unpair(self.oz_dx), unpair(self.dy_dz));
+        Ray { origin: vec3(ox, oy, oz), direction: vec3(dx, dy, dz), t_max: self.t_max }
+    }
+}
+
+#[inline(always)]
+fn pair(low: f32, high: f32) -> u64 {
+    u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32
+}
+
+#[inline(always)]
+fn unpair(bits: u64) -> (f32, f32) {
+    (f32::from_bits(bits as u32), f32::from_bits((bits >> 32) as u32))
+}
+
+/// A hit as bits: distance and u; v and the triangle's number, which is `u32::MAX` where there is none.
+#[derive(Clone, Copy)]
+pub(super) struct Answer(u64, u64);
+
+impl Answer {
+    const NOTHING: Self = Self(0, u64::MAX);
+
+    #[inline(always)]
+    fn new(nearest: &Nearest, t_scale: f32) -> Self {
+        let id = if nearest.found { nearest.id } else { u32::MAX };
+        Self(pair(nearest.t * t_scale, nearest.u), pair(nearest.v, f32::from_bits(id)))
+    }
+
+    #[inline(always)]
+    pub(super) fn is_hit(self) -> bool {
+        self.1 >> 32 != u64::from(u32::MAX)
+    }
+
+    #[inline(always)]
+    pub(super) fn hit(self) -> Option<Hit> {
+        let ((t, u), (v, _)) = (unpair(self.0), unpair(self.1));
+        self.is_hit().then_some(Hit { t, u, v, triangle: (self.1 >> 32) as u32 })
+    }
 }
 
 struct With<L, Q>(L, Q);
 
 impl<L: Lanes, const ANY: bool> WithSimd for With<L, Query<'_, ANY>> {
-    type Output = Nearest;
+    type Output = Answer;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Nearest {
+    fn with_simd<S: Simd>(self, _: S) -> Answer {
         self.1.run(self.0)
     }
 }
 
 impl<const ANY: bool> Query<'_, ANY> {
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> Nearest {
-        let ray = RayLanes::new(l, self.frame, self.scene.holes.as_deref());
-        let mut nearest = Nearest::none(self.frame.t_max);
+    fn run<L: Lanes>(self, l: L) -> Answer {
+        let Some(frame) = RayFrame::new(&self.ray(), self.scene.lo, self.scene.hi) else {
+            return Answer::NOTHING;
+        };
+        let ray = RayLanes::new(l, &frame, self.scene.holes.as_deref());
+        let mut nearest = Nearest::none(frame.t_max);
         let stack = (self.stack, 0);
         match self.scene.parts.as_slice() {
             [part] => {
@@ -93,7 +159,7 @@ impl<const ANY: bool> Query<'_, ANY> {
                 walk::<L, _, ANY>(l, tree, parts, &ray, stack, &mut nearest);
             }
         }
-        nearest
+        Answer::new(&nearest, frame.t_scale)
     }
 }
 

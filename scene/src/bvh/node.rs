@@ -44,12 +44,13 @@ pub(super) struct SlabLanes<L: Lanes> {
 impl<L: Lanes> SlabLanes<L> {
     #[inline(always)]
     pub(super) fn new(l: L, frame: &RayFrame) -> Self {
-        let [x, y, z] = frame.inverse;
-        let (near, far) = (&frame.near_origin, &frame.far_origin);
+        let near = |k: usize| slab(l, frame.near_origin[k], frame.near_offset[k], frame.inverse[k]);
+        let far = |k: usize| slab(l, frame.far_origin[k], frame.far_offset[k], frame.inverse[k]);
+        let backwards = frame.inverse.is_negative_bitmask() as usize;
         Self {
-            near: [slab(l, near[0], x), slab(l, near[1], y), slab(l, near[2], z)],
-            far: [slab(l, far[0], x), slab(l, far[1], y), slab(l, far[2], z)],
-            near_row: [usize::from(x < 0.0), usize::from(y < 0.0), usize::from(z < 0.0)],
+            near: [near(0), near(1), near(2)],
+            far: [far(0), far(1), far(2)],
+            near_row: [backwards & 1, backwards >> 1 & 1, backwards >> 2 & 1],
         }
     }
 
@@ -69,6 +70,6 @@ impl<L: Lanes> SlabLanes<L> {
 }
 
 #[inline(always)]
-fn slab<L: Lanes>(l: L, origin: f32, inverse: f32) -> Slab<L::F> {
-    Slab { inverse: l.splat(inverse), origin: l.splat(origin), offset: l.splat(origin * inverse) }
+fn slab<L: Lanes>(l: L, origin: f32, offset: f32, inverse: f32) -> Slab<L::F> {
+    Slab { inverse: l.splat(inverse), origin: l.splat(origin), offset: l.splat(offset) }
 }

@@ -1,6 +1,6 @@
 //! Turns a ray into the constants that box and triangle tests share, or into nothing where it cannot hit.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::Ray;
 
@@ -26,17 +26,27 @@ pub const NODE_PAD_ORIGIN: f32 = 4.0 * ROUND_OFF;
 /// reciprocals stay finite: within the scene such a ray moves sideways by < 2⁻³⁹ of its length, far below the padding.
 pub const SMALLEST_COMPONENT: f32 = 1.0 / MAX_COORDINATE;
 
+/// Directions with all components from this to [`USUAL_UP_TO`] are not scaled: that would change nothing, as powers of
+/// two are exact, and no component is below [`SMALLEST_COMPONENT`] of the largest.
+const USUAL_FROM: f32 = 1.0 / 1_073_741_824.0;
+const USUAL_UP_TO: f32 = 512.0;
+
 /// A ray whose direction is scaled by a power of two (exactly) to a largest component in [1, 2).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayFrame {
-    pub(super) origin: [f32; 3],
     /// Reciprocal of the scaled direction, finite and not zero.
-    pub(super) inverse: [f32; 3],
+    pub(super) inverse: Vec3A,
     /// Origins for the near and the far planes of node boxes.
-    pub(super) near_origin: [f32; 3],
-    pub(super) far_origin: [f32; 3],
+    pub(super) near_origin: Vec3A,
+    pub(super) far_origin: Vec3A,
+    /// These origins times `inverse`.
+    pub(super) near_offset: Vec3A,
+    pub(super) far_offset: Vec3A,
     /// Axes: `axis[2]` is the direction's largest, `axis[0]` and `axis[1]` follow it cyclically.
     pub(super) axis: [usize; 3],
+    /// Origin and `inverse` in the order of `axis`.
+    pub(super) origin_turned: [f32; 3],
+    pub(super) inverse_turned: [f32; 3],
     /// Shear that takes the direction to `axis[2]`, and the reciprocal of its length there.
     pub(super) shear: [f32; 2],
     pub(super) inverse_z: f64,
@@ -51,54 +61,69 @@ impl RayFrame {
     /// beyond [`MAX_COORDINATE`].
     #[inline(always)]
     pub(super) fn new(ray: &Ray, lo: Vec3, hi: Vec3) -> Option<Self> {
-        let largest = ray.direction.abs().max_element();
-        let origin_largest = ray.origin.abs().max_element();
-        let sound = largest > 0.0
-            && ray.direction.is_finite()
-            && ray.origin.is_finite()
-            && origin_largest <= MAX_COORDINATE
-            && ray.t_max > 0.0;
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let largest = direction.abs().max_element();
+        // Comparisons with NaN are false.
+        let sound = direction.abs().cmple(Vec3A::MAX).all()
+            & origin.abs().cmple(Vec3A::splat(MAX_COORDINATE)).all()
+            & (largest > 0.0)
+            & (ray.t_max > 0.0);
         if !sound {
             return None;
         }
-        // 2^-e and 2^e for largest in [2^e, 2^(e+1)); the ends of the exponent range stay within a factor of 2^22.
-        let exponent = (largest.to_bits() >> 23).clamp(1, 253);
-        let scale = f32::from_bits((254 - exponent) << 23);
-        let t_rescale = f32::from_bits(exponent << 23);
-
-        let direction = ray.direction * scale;
-        let distance = (lo - ray.origin).abs().max((hi - ray.origin).abs()).max_element();
-        let pad = distance * NODE_PAD_DISTANCE + origin_largest * NODE_PAD_ORIGIN;
-        let smallest = largest * scale * SMALLEST_COMPONENT;
-        let mut frame = Self {
-            origin: ray.origin.to_array(),
-            inverse: [0.0; 3],
-            near_origin: [0.0; 3],
-            far_origin: [0.0; 3],
-            axis: largest_axis(direction),
-            shear: [0.0; 2],
-            inverse_z: 0.0,
-            t_max: ray.t_max * t_rescale,
-            t_scale: scale,
+        // Most rays need no scaling, and no wait for their largest component: a branch that is nearly always predicted.
+        let usual = (direction.abs().cmpge(Vec3A::splat(USUAL_FROM))
+            & direction.abs().cmple(Vec3A::splat(USUAL_UP_TO)))
+        .all();
+        let (direction, component, t_max, scale) = if usual {
+            (direction, direction, ray.t_max, 1.0)
+        } else {
+            scaled(direction, ray.t_max)
         };
-        let d = direction.to_array();
-        for (k, d) in d.into_iter().enumerate() {
-            let component = d.abs().max(smallest).copysign(d);
-            frame.inverse[k] = 1.0 / component;
-            let outwards = pad.copysign(component);
-            frame.near_origin[k] = frame.origin[k] + outwards;
-            frame.far_origin[k] = frame.origin[k] - outwards;
-        }
-        let [kx, ky, kz] = frame.axis;
-        frame.shear = [d[kx] / d[kz], d[ky] / d[kz]];
-        frame.inverse_z = 1.0 / f64::from(d[kz]);
-        Some(frame)
+        let distance = (Vec3A::from(lo) - origin).abs().max((Vec3A::from(hi) - origin).abs()).max_element();
+        let pad = distance * NODE_PAD_DISTANCE + origin.abs().max_element() * NODE_PAD_ORIGIN;
+        let inverse = component.recip();
+        let outwards = Vec3A::splat(pad).copysign(component);
+        let (near_origin, far_origin) = (origin + outwards, origin - outwards);
+        let axis = largest_axis(direction);
+        let [kx, ky, kz] = axis;
+        let (o, i, d) = (origin.to_array(), inverse.to_array(), direction.to_array());
+        Some(Self {
+            inverse,
+            near_origin,
+            far_origin,
+            near_offset: near_origin * inverse,
+            far_offset: far_origin * inverse,
+            axis,
+            origin_turned: [o[kx], o[ky], o[kz]],
+            inverse_turned: [i[kx], i[ky], i[kz]],
+            shear: [d[kx] / d[kz], d[ky] / d[kz]],
+            inverse_z: 1.0 / f64::from(d[kz]),
+            t_max,
+            t_scale: scale,
+        })
     }
+}
+
+/// A direction scaled by a power of two to a largest component in [1, 2), the same without components that are too
+/// small for a reciprocal, `t_max` in its units, and the scale.
+#[cold]
+#[inline(never)]
+fn scaled(direction: Vec3A, t_max: f32) -> (Vec3A, Vec3A, f32, f32) {
+    let largest = direction.abs().max_element();
+    // 2^-e and 2^e for largest in [2^e, 2^(e+1)); the ends of the exponent range stay within a factor of 2^22.
+    let exponent = (largest.to_bits() >> 23).clamp(1, 253);
+    let scale = f32::from_bits((254 - exponent) << 23);
+    let t_rescale = f32::from_bits(exponent << 23);
+    let direction = direction * scale;
+    let smallest = largest * scale * SMALLEST_COMPONENT;
+    let component = direction.abs().max(Vec3A::splat(smallest)).copysign(direction);
+    (direction, component, t_max * t_rescale, scale)
 }
 
 /// The largest component's axis last, the others before it in cyclic order; no branch, as rays are incoherent.
 #[inline(always)]
-fn largest_axis(direction: Vec3) -> [usize; 3] {
+fn largest_axis(direction: Vec3A) -> [usize; 3] {
     const ENDING_IN: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
     let d = direction.abs();
     let y_over_x = usize::from(d.y > d.x);

@@ -7,12 +7,10 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 
 use super::collapse::collapse;
-use super::dispatch::{Instructions, Query, detect};
+use super::dispatch::{Answer, Instructions, Query, detect};
 use super::node::{NONE, Node};
 use super::part::{Bvh, binary_tree};
-use super::ray_frame::RayFrame;
-use super::triangle::Nearest;
-use super::walk::STACK_OF_THREAD;
+use super::walk::Stack;
 use super::{Hit, Holes, Ray};
 
 /// Parts under a small top level; a clone shares the parts.
@@ -119,26 +117,21 @@ impl SceneBvh {
     /// The hit with the smallest distance, of several at that distance the one with the lowest triangle number.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let frame = RayFrame::new(ray, self.lo, self.hi)?;
-        let nearest = self.run::<false>(&frame);
-        nearest.found.then_some(Hit {
-            t: nearest.t * frame.t_scale,
-            u: nearest.u,
-            v: nearest.v,
-            triangle: nearest.id,
-        })
+        self.run::<false>(ray).hit()
     }
 
     /// Whether anything is hit at all; the same as `closest(ray).is_some()`, and faster.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        RayFrame::new(ray, self.lo, self.hi).is_some_and(|frame| self.run::<true>(&frame).found)
+        self.run::<true>(ray).is_hit()
     }
 
-    #[inline]
-    fn run<const ANY: bool>(&self, frame: &RayFrame) -> Nearest {
-        STACK_OF_THREAD
-            .with_borrow_mut(|stack| self.instructions.run(Query::<ANY> { scene: self, frame, stack }))
+    #[inline(always)]
+    fn run<const ANY: bool>(&self, ray: &Ray) -> Answer {
+        let mut stack = Stack::take();
+        let answer = self.instructions.run(Query::<ANY>::new(self, &mut stack, ray));
+        stack.put_back();
+        answer
     }
 
     /// Lower and upper corner of all triangles that can be hit; twice the origin if there are none.

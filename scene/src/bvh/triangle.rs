@@ -84,9 +84,8 @@ pub(super) struct ShearLanes<L: Lanes> {
 impl<L: Lanes> ShearLanes<L> {
     #[inline(always)]
     pub(super) fn new(l: L, frame: &RayFrame) -> Self {
-        let ([kx, ky, kz], o) = (frame.axis, &frame.origin);
         Self {
-            origin: [l.splat(o[kx]), l.splat(o[ky]), l.splat(o[kz])],
+            origin: frame.origin_turned.map(|coordinate| l.splat(coordinate)),
             shear: [l.splat(frame.shear[0]), l.splat(frame.shear[1])],
             zero: l.splat(0.0),
         }
@@ -174,10 +173,10 @@ pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32
     let (low_z, high_z) = extent(a.moved[2], b.moved[2], c.moved[2]);
     let reach = larger(larger(larger(-low_x, high_x), larger(-low_y, high_y)), larger(-low_z, high_z));
     let pad = reach * TRIANGLE_PAD;
-    let [kx, ky, kz] = frame.axis;
-    let (near_x, far_x) = interval(low_x - pad, high_x + pad, frame.inverse[kx]);
-    let (near_y, far_y) = interval(low_y - pad, high_y + pad, frame.inverse[ky]);
-    let (near_z, far_z) = interval(low_z - pad, high_z + pad, frame.inverse[kz]);
+    let inverse_turned = &frame.inverse_turned;
+    let (near_x, far_x) = interval(low_x - pad, high_x + pad, inverse_turned[0]);
+    let (near_y, far_y) = interval(low_y - pad, high_y + pad, inverse_turned[1]);
+    let (near_z, far_z) = interval(low_z - pad, high_z + pad, inverse_turned[2]);
     let near = larger(larger(near_x, near_y), near_z);
     let far = smaller(smaller(far_x, far_y), far_z);
     let t = smaller(larger(t, near), far);
@@ -195,9 +194,8 @@ impl Sheared {
     #[inline(always)]
     fn new(frame: &RayFrame, vertex: &[f32; 3]) -> Self {
         let [kx, ky, kz] = frame.axis;
-        let x = vertex[kx] - frame.origin[kx];
-        let y = vertex[ky] - frame.origin[ky];
-        let z = vertex[kz] - frame.origin[kz];
+        let origin = &frame.origin_turned;
+        let (x, y, z) = (vertex[kx] - origin[0], vertex[ky] - origin[1], vertex[kz] - origin[2]);
         Self { moved: [x, y, z], x: f64::from(x - frame.shear[0] * z), y: f64::from(y - frame.shear[1] * z) }
     }
 }
