@@ -54,7 +54,11 @@ impl Instructions {
     pub(super) fn run<const ANY: bool>(self, query: Query<'_, ANY>) -> Answer {
         match self {
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(simd) => Simd::vectorize(simd, With(Avx2(simd), query)),
+            Self::Avx2(simd) if query.scene.parts.len() == 1 => {
+                Simd::vectorize(simd, With::<_, _, true>(Avx2(simd), query))
+            }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(simd) => Simd::vectorize(simd, With::<_, _, false>(Avx2(simd), query)),
             Self::Portable => run_portable(query),
         }
     }
@@ -63,7 +67,7 @@ impl Instructions {
 /// Not inlined, so that what chooses is small.
 #[inline(never)]
 fn run_portable<const ANY: bool>(query: Query<'_, ANY>) -> Answer {
-    query.run(Portable)
+    if query.scene.parts.len() == 1 { query.run::<_, true>(Portable) } else { query.run::<_, false>(Portable) }
 }
 
 /// One ray against one scene, in six registers, as the answer is in two: a ray costs as little as 100 ns, and to load as a
@@ -128,20 +132,21 @@ impl Answer {
     }
 }
 
-struct With<L, Q>(L, Q);
+/// `ONE`: the scene has one part.
+struct With<L, Q, const ONE: bool>(L, Q);
 
-impl<L: Lanes, const ANY: bool> WithSimd for With<L, Query<'_, ANY>> {
+impl<L: Lanes, const ANY: bool, const ONE: bool> WithSimd for With<L, Query<'_, ANY>, ONE> {
     type Output = Answer;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Answer {
-        self.1.run(self.0)
+        self.1.run::<_, ONE>(self.0)
     }
 }
 
 impl<const ANY: bool> Query<'_, ANY> {
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> Answer {
+    fn run<L: Lanes, const ONE: bool>(self, l: L) -> Answer {
         let Some(frame) = RayFrame::new(&self.ray(), self.scene.lo, self.scene.hi) else {
             return Answer::NOTHING;
         };
@@ -149,11 +154,12 @@ impl<const ANY: bool> Query<'_, ANY> {
         let mut nearest = Nearest::none(frame.t_max);
         let stack = (self.stack, 0);
         match self.scene.parts.as_slice() {
-            [part] => {
+            [part] if ONE => {
                 let bvh = &*part.bvh;
                 let tree = (bvh.nodes.as_slice(), bvh.root);
                 walk::<L, _, ANY>(l, tree, bvh.packets.as_slice(), &ray, stack, &mut nearest);
             }
+            _ if ONE => {}
             parts => {
                 let tree = (self.scene.top.as_slice(), self.scene.root);
                 walk::<L, _, ANY>(l, tree, parts, &ray, stack, &mut nearest);
@@ -164,6 +170,11 @@ impl<const ANY: bool> Query<'_, ANY> {
 }
 
 impl<L: Lanes> Leaves<L> for [Part] {
+    #[inline(always)]
+    fn address(&self, index: u32) -> *const u8 {
+        self.as_ptr().wrapping_add(index as usize).cast()
+    }
+
     #[inline(always)]
     fn intersect<const ANY: bool>(
         &self,

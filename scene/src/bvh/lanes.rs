@@ -49,6 +49,8 @@ pub(super) trait Lanes: Copy {
     /// Where `max(near…, 0)` ≤ `min(far…)`, and that maximum.
     fn overlap(self, near: [Self::F; 3], far: [Self::F; 3], t_max: Self::F) -> (Self::M, Self::F);
     fn store(self, value: Self::F) -> F32x8;
+    /// Asks for the 256 bytes from `address`, which need not exist.
+    fn prefetch(self, address: *const u8);
     /// The masked children and their entry distances (rounded down by up to 7 ulps), farthest first, the rest after.
     /// `near` is not negative in masked lanes.
     fn order(self, mask: Self::M, near: Self::F, children: &U32x8) -> (U32x8, F32x8);
@@ -133,6 +135,8 @@ impl Lanes for Portable {
     fn store(self, value: F32x8) -> F32x8 {
         value
     }
+    #[inline(always)]
+    fn prefetch(self, _: *const u8) {}
     #[inline(always)]
     fn order(self, mask: U32x8, near: F32x8, children: &U32x8) -> (U32x8, F32x8) {
         let mut out = (U32x8([u32::MAX; WIDTH]), F32x8([0.0; WIDTH]));

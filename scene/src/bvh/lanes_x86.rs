@@ -12,6 +12,8 @@ use super::lanes::{F32x8, Lanes, Slab, U32x8};
 pub(super) struct Avx2(pub(super) V3);
 
 const ALL_BITS: i32 = -1;
+/// In bytes.
+const CACHE_LINE: usize = 64;
 
 impl Avx2 {
     /// One layer of a descending sorting network: lanes set in `KEEP_MAX` take the larger of the pair.
@@ -103,6 +105,13 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn store(self, value: __m256) -> F32x8 {
         cast(value)
+    }
+    #[inline(always)]
+    fn prefetch(self, address: *const u8) {
+        for line in 0..4 {
+            let address = address.wrapping_add(line * CACHE_LINE).cast::<i8>();
+            self.0.sse._mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(address);
+        }
     }
     #[inline(always)]
     fn order(self, mask: __m256, near: __m256, children: &U32x8) -> (U32x8, F32x8) {

@@ -53,6 +53,8 @@ impl Stack {
 
 /// What the leaves of a tree hold.
 pub(super) trait Leaves<L: Lanes> {
+    /// Where leaf `index` is, if it is.
+    fn address(&self, index: u32) -> *const u8;
     /// Offers the hits inside leaf `index` to `nearest`; the stack is free from `base`.
     fn intersect<const ANY: bool>(
         &self,
@@ -80,6 +82,10 @@ impl<'a, L: Lanes> RayLanes<'a, L> {
 }
 
 impl<L: Lanes> Leaves<L> for [Packet] {
+    #[inline(always)]
+    fn address(&self, index: u32) -> *const u8 {
+        self.as_ptr().wrapping_add(index as usize).cast()
+    }
     #[inline(always)]
     fn intersect<const ANY: bool>(
         &self,
@@ -128,6 +134,7 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
                     current = node.children.0[near];
                     stack.references[top] = node.children.0[far];
                     stack.distances[top] = entry.0[far];
+                    prefetch(l, nodes, leaves, node.children.0[far]);
                     top += 1;
                 } else {
                     let (sorted, near) = l.order(mask, entry, &node.children);
@@ -135,6 +142,9 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
                     stack.distances[top..top + WIDTH].copy_from_slice(&near.0);
                     top += bits.count_ones() as usize - 1;
                     current = stack.references[top];
+                    for &pushed in &stack.references[top - bits.count_ones() as usize + 1..top] {
+                        prefetch(l, nodes, leaves, pushed);
+                    }
                 }
                 continue;
             }
@@ -153,4 +163,13 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
         }
         return;
     }
+}
+
+#[inline(always)]
+fn prefetch<L: Lanes, V: Leaves<L> + ?Sized>(l: L, nodes: &[Node], leaves: &V, reference: u32) {
+    let node = nodes.as_ptr().wrapping_add(reference as usize);
+    // Without a branch: whether a child is a leaf is not to be predicted.
+    let is_leaf = usize::from(reference & LEAF != 0).wrapping_neg();
+    let leaf = leaves.address(reference & !LEAF);
+    l.prefetch(leaf.map_addr(|leaf| node.addr() ^ ((leaf ^ node.addr()) & is_leaf)));
 }
