@@ -8,10 +8,18 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
+use super::lanes::WIDTH;
+
 /// Candidate cuts per axis of large sets are the borders of this many bins.
 const BINS: usize = 32;
 /// Sets up to this size try every cut between sorted centres.
 const SWEEP_UP_TO: usize = 64;
+
+/// What a set costs in units of its area: packets, taken as half filled.
+#[inline(always)]
+fn packets(count: usize) -> f32 {
+    count.div_ceil(WIDTH / 2) as f32
+}
 
 #[derive(Clone, Copy)]
 struct Item {
@@ -80,12 +88,12 @@ fn sweep(items: &mut [Item], lo: Vec3A, hi: Vec3A) -> Option<usize> {
         let mut bounds = Aabb::INVALID;
         for (i, item) in items.iter().enumerate() {
             bounds = bounds.union(&item.bounds);
-            left_cost[i] = bounds.half_area() * (i + 1) as f32;
+            left_cost[i] = bounds.half_area() * packets(i + 1);
         }
         bounds = Aabb::INVALID;
         for i in (1..items.len()).rev() {
             bounds = bounds.union(&items[i].bounds);
-            let cost = left_cost[i - 1] + bounds.half_area() * (items.len() - i) as f32;
+            let cost = left_cost[i - 1] + bounds.half_area() * packets(items.len() - i);
             if best.is_none_or(|best| cost < best.0) {
                 best = Some((cost, axis, i));
             }
@@ -120,12 +128,12 @@ fn bin(items: &mut [Item], lo: Vec3A, hi: Vec3A) -> Option<usize> {
         let (mut bounds, mut count) = (Aabb::INVALID, 0);
         for (cost, bin) in left_cost.iter_mut().zip(bins) {
             (bounds, count) = (bounds.union(&bin.0), count + bin.1);
-            *cost = if count == 0 { f32::INFINITY } else { bounds.half_area() * count as f32 };
+            *cost = if count == 0 { f32::INFINITY } else { bounds.half_area() * packets(count) };
         }
         (bounds, count) = (Aabb::INVALID, 0);
         for i in (1..BINS).rev() {
             (bounds, count) = (bounds.union(&bins[i].0), count + bins[i].1);
-            let cost = left_cost[i - 1] + bounds.half_area() * count as f32;
+            let cost = left_cost[i - 1] + bounds.half_area() * packets(count);
             if count > 0 && cost.is_finite() && best.is_none_or(|best| cost < best.0) {
                 best = Some((cost, axis, i));
             }
