@@ -1,8 +1,9 @@
-//! Turns photon walks through two scenes into rays per second of this crate's structure against obvhs's CWBVH.
+//! Turns photon walks through three scenes into rays per second of this crate's structure against obvhs's CWBVH.
 //!
 //! Path i: isotropic emission at 75 % of the bounding box's height, survival 0.6 per hit, cosine-weighted bounce, PCG
 //! stream seeded by i: the same rays for every tracer. Rounds alternate between the tracers, the best round counts.
-//! `PHOTONSTREAM_SCENES` names the folder with `dabrovic_sponza/sponza.obj`; without it only the box is walked.
+//! `PHOTONSTREAM_SCENES` names the folder with `dabrovic_sponza/sponza.obj` and `stanford_dragon/dragon_vrip_res2.ply`, which
+//! stands in a closed room as in `configs/dragon.toml`; without it only the box is walked.
 //! `PHOTONSTREAM_SOUP=DIR` also writes each scene as a triangle soup (u32 count, 9 f32 per triangle) for other tracers.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::single_range_in_vec_init, missing_docs)]
 
@@ -14,6 +15,7 @@ use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use photonstream_scene::bvh::{Ray, SceneBvh};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 const ROUNDS: usize = 7;
@@ -21,16 +23,18 @@ const ROUNDS: usize = 7;
 fn main() {
     let (vertices, triangles) = cornell_like_box();
     compare("cornell-like box", &vertices, &triangles, 300_000);
-    let sponza = std::env::var_os("PHOTONSTREAM_SCENES")
-        .map(|folder| std::path::Path::new(&folder).join("dabrovic_sponza/sponza.obj"));
-    match sponza.filter(|path| path.exists()) {
-        Some(path) => {
-            let (vertices, triangles) = load(&path);
-            compare("dabrovic sponza", &vertices, &triangles, 150_000);
+    for (name, file, load) in [
+        ("dabrovic sponza", "dabrovic_sponza/sponza.obj", load as fn(&Path) -> Mesh),
+        ("stanford dragon", "stanford_dragon/dragon_vrip_res2.ply", dragon_in_a_room),
+    ] {
+        let path = std::env::var_os("PHOTONSTREAM_SCENES").map(|folder| Path::new(&folder).join(file));
+        match path.filter(|path| path.exists()) {
+            Some(path) => {
+                let (vertices, triangles) = load(&path);
+                compare(name, &vertices, &triangles, 150_000);
+            }
+            None => println!("SKIP {name}: set PHOTONSTREAM_SCENES to the folder that holds {file}"),
         }
-        None => println!(
-            "SKIP dabrovic sponza: set PHOTONSTREAM_SCENES to the folder that holds dabrovic_sponza/"
-        ),
     }
 }
 
@@ -41,7 +45,7 @@ fn compare(name: &str, vertices: &[Vec3], triangles: &[[u32; 3]], paths: u64) {
         for coordinate in soup.iter().flatten().flat_map(Vec3::to_array) {
             bytes.extend(coordinate.to_le_bytes());
         }
-        std::fs::write(std::path::Path::new(&folder).join(format!("{name}.bin")), bytes).unwrap();
+        std::fs::write(Path::new(&folder).join(format!("{name}.bin")), bytes).unwrap();
     }
     let walk = Walk::new(&soup);
 
@@ -234,7 +238,7 @@ fn block(mesh: &mut Mesh, lo: Vec3, size: Vec3, cells: u32) {
     }
 }
 
-fn load(path: &std::path::Path) -> Mesh {
+fn load(path: &Path) -> Mesh {
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let (models, _) = tobj::load_obj(path, &options).unwrap();
     let mut mesh = (Vec::new(), Vec::new());
@@ -243,5 +247,28 @@ fn load(path: &std::path::Path) -> Mesh {
         mesh.0.extend(model.mesh.positions.chunks_exact(3).map(Vec3::from_slice));
         mesh.1.extend(model.mesh.indices.chunks_exact(3).map(|t| [t[0] + base, t[1] + base, t[2] + base]));
     }
+    mesh
+}
+
+/// The scan as text, 7.3 times its size on the floor of a room of 2 m, 8 × 8 quads a wall.
+fn dragon_in_a_room(path: &Path) -> Mesh {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let mut counts = Vec::new();
+    for line in lines.by_ref().take_while(|line| *line != "end_header") {
+        if let Some(element) = line.strip_prefix("element ") {
+            counts.push(element.split(' ').nth(1).unwrap().parse::<usize>().unwrap());
+        }
+    }
+    let mut mesh: Mesh = (Vec::new(), Vec::new());
+    for line in lines.by_ref().take(counts[0]) {
+        let p: Vec<f32> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+        mesh.0.push(vec3(p[0], p[1], p[2]) * 7.3 + vec3(0.04, -0.385, 0.0));
+    }
+    for line in lines.take(counts[1]) {
+        let t: Vec<u32> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+        mesh.1.push([t[1], t[2], t[3]]);
+    }
+    block(&mut mesh, vec3(-1.0, 0.0, -1.0), vec3(2.0, 2.0, 2.0), 8);
     mesh
 }

@@ -11,8 +11,8 @@ use super::lanes_x86::Avx2;
 use super::ray_frame::RayFrame;
 use super::scene_bvh::{Part, SceneBvh};
 use super::triangle::Nearest;
-use super::{Hit, Ray};
 use super::walk::{Leaves, RayLanes, Stack, walk};
+use super::{Hit, Ray};
 
 /// What the kernels are compiled for; holding a variant proves that the processor has it.
 ///
@@ -67,7 +67,11 @@ impl Instructions {
 /// Not inlined, so that what chooses is small.
 #[inline(never)]
 fn run_portable<const ANY: bool>(query: Query<'_, ANY>) -> Answer {
-    if query.scene.parts.len() == 1 { query.run::<_, true>(Portable) } else { query.run::<_, false>(Portable) }
+    if query.scene.parts.len() == 1 {
+        query.run::<_, true>(Portable)
+    } else {
+        query.run::<_, false>(Portable)
+    }
 }
 
 /// One ray against one scene, in six registers, as the answer is in two: a ray costs as little as 100 ns, and to load as a

@@ -36,6 +36,7 @@
 //!   flat regular walls (29 nodes a ray instead of 5 in a tessellated cube), so a tree cut from the top by surface area
 //!   is built too, and the cheaper one kept. The compressed 8-wide tree of obvhs is not used on the CPU: its node test
 //!   has a constant epsilon, and decoding costs time.
+//! - **Wald 2007** counts triangles; a cut here costs the packets on either side, as if half filled.
 //! - **Embree** sorts by scalar code for one to four children, splits triangles spatially, and tests four triangles by
 //!   Möller and Trumbore. Here three or more children go through a sorting network without a branch, there are no
 //!   spatial splits (a piece's box would not enclose its triangle, and the argument above would fall).

@@ -75,11 +75,8 @@ impl RayFrame {
         let usual = (direction.abs().cmpge(Vec3A::splat(USUAL_FROM))
             & direction.abs().cmple(Vec3A::splat(USUAL_UP_TO)))
         .all();
-        let (direction, component, t_max, scale) = if usual {
-            (direction, direction, ray.t_max, 1.0)
-        } else {
-            scaled(direction, ray.t_max)
-        };
+        let (direction, component, t_max, scale) =
+            if usual { (direction, direction, ray.t_max, 1.0) } else { scaled(direction, ray.t_max) };
         let distance = (Vec3A::from(lo) - origin).abs().max((Vec3A::from(hi) - origin).abs()).max_element();
         let pad = distance * NODE_PAD_DISTANCE + origin.abs().max_element() * NODE_PAD_ORIGIN;
         let inverse = component.recip();

@@ -1,7 +1,8 @@
 //! Turns boxes into a binary tree from the top down, each cut at the least surface-area cost.
 //!
-//! Source: Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"; deviates: small sets try every
-//! cut, leaves hold one box (the collapse decides how many share a leaf), nothing recurses.
+//! Source: Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"; deviates: a set costs
+//! packets instead of boxes, small sets try every cut, leaves hold one box (the collapse decides how many share a leaf), nothing
+//! recurses.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;

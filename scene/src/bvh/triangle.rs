@@ -29,7 +29,17 @@ impl Packet {
         self.ids.0[lane] = id;
     }
 
+    /// As [`Self::triangle`], with the axes in the order of `axis`, and no way through memory.
     #[inline(always)]
+    fn turned(&self, lane: usize, [x, y, z]: [usize; 3]) -> [[f32; 3]; 3] {
+        let [a, b, c] = &self.vertices;
+        [
+            [a[x].0[lane], a[y].0[lane], a[z].0[lane]],
+            [b[x].0[lane], b[y].0[lane], b[z].0[lane]],
+            [c[x].0[lane], c[y].0[lane], c[z].0[lane]],
+        ]
+    }
+
     pub(super) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         let [a, b, c] = &self.vertices;
         [
@@ -127,7 +137,7 @@ impl<L: Lanes> ShearLanes<L> {
         while candidates != 0 {
             let lane = candidates.trailing_zeros() as usize % WIDTH;
             candidates &= candidates - 1;
-            if let Some(hit) = resolve(frame, &packet.triangle(lane)) {
+            if let Some(hit) = resolve_turned(frame, &packet.turned(lane, frame.axis)) {
                 let id = packet.ids.0[lane];
                 if holes.is_none_or(|holes| !holes.contain(id, hit[1], hit[2])) {
                     nearest.offer(id, hit);
@@ -147,8 +157,15 @@ fn edge<L: Lanes>(l: L, p: [L::F; 2], q: [L::F; 2]) -> L::F {
 /// Vertices are translated and sheared in `f32` exactly as in the filter; the edge functions are products of 24-bit
 /// numbers, exact in `f64`, so their signs are exact and agree between triangles that share an edge. The distance is
 /// clamped to the triangle's own padded box, which makes culling by any enclosing box exact (see the module's notes).
-#[inline(always)]
+#[cfg(test)]
 pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32; 3]> {
+    let [kx, ky, kz] = frame.axis;
+    resolve_turned(frame, &triangle.map(|vertex| [vertex[kx], vertex[ky], vertex[kz]]))
+}
+
+/// As `resolve`, with the axes in the order of `frame.axis`.
+#[inline(always)]
+fn resolve_turned(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32; 3]> {
     let (a, b, c) = (
         Sheared::new(frame, &triangle[0]),
         Sheared::new(frame, &triangle[1]),
@@ -166,7 +183,7 @@ pub(super) fn resolve(frame: &RayFrame, triangle: &[[f32; 3]; 3]) -> Option<[f32
     }
     let inverse = 1.0 / determinant;
     let z = u * f64::from(a.moved[2]) + v * f64::from(b.moved[2]) + w * f64::from(c.moved[2]);
-    let t = (z * inverse * frame.inverse_z) as f32;
+    let t = (z * frame.inverse_z * inverse) as f32;
 
     let (low_x, high_x) = extent(a.moved[0], b.moved[0], c.moved[0]);
     let (low_y, high_y) = extent(a.moved[1], b.moved[1], c.moved[1]);
@@ -193,9 +210,8 @@ struct Sheared {
 impl Sheared {
     #[inline(always)]
     fn new(frame: &RayFrame, vertex: &[f32; 3]) -> Self {
-        let [kx, ky, kz] = frame.axis;
         let origin = &frame.origin_turned;
-        let (x, y, z) = (vertex[kx] - origin[0], vertex[ky] - origin[1], vertex[kz] - origin[2]);
+        let (x, y, z) = (vertex[0] - origin[0], vertex[1] - origin[1], vertex[2] - origin[2]);
         Self { moved: [x, y, z], x: f64::from(x - frame.shear[0] * z), y: f64::from(y - frame.shear[1] * z) }
     }
 }

@@ -142,7 +142,7 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
                     stack.distances[top..top + WIDTH].copy_from_slice(&near.0);
                     top += bits.count_ones() as usize - 1;
                     current = stack.references[top];
-                    for &pushed in &stack.references[top - bits.count_ones() as usize + 1..top] {
+                    for &pushed in &stack.references[top + 1 - bits.count_ones() as usize..top] {
                         prefetch(l, nodes, leaves, pushed);
                     }
                 }
