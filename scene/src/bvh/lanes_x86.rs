@@ -11,7 +11,7 @@ use super::lanes::{F32x8, Lanes, Slab, U32x8};
 #[derive(Clone, Copy)]
 pub(super) struct Avx2(pub(super) V3);
 
-const ALL_BITS: i32 = -1;
+pub(super) const ALL_BITS: i32 = -1;
 /// In bytes.
 const CACHE_LINE: usize = 64;
 
@@ -24,6 +24,28 @@ impl Avx2 {
             avx2._mm256_min_epi32(keys, partner),
             avx2._mm256_max_epi32(keys, partner),
         )
+    }
+
+    /// `max(near…, 0)` and `min(far…, t_max)` as integers, whose minima and maxima take one cycle instead of four: floats
+    /// that are not negative order as integers; a negative one is below them all, whichever negative one it is. So a
+    /// negative entry becomes 0, and a negative exit remains below every entry.
+    #[inline(always)]
+    pub(super) fn entry_and_exit(
+        self,
+        near: [__m256; 3],
+        far: [__m256; 3],
+        t_max: __m256,
+    ) -> (__m256i, __m256i) {
+        let (avx, avx2) = (self.0.avx, self.0.avx2);
+        let entry = avx2._mm256_max_epi32(
+            avx2._mm256_max_epi32(cast(near[0]), cast(near[1])),
+            avx2._mm256_max_epi32(cast(near[2]), avx._mm256_setzero_si256()),
+        );
+        let exit = avx2._mm256_min_epi32(
+            avx2._mm256_min_epi32(cast(far[0]), cast(far[1])),
+            avx2._mm256_min_epi32(cast(far[2]), cast(t_max)),
+        );
+        (entry, exit)
     }
 
     /// Eight signed integers in descending order: the bitonic network, six layers.
@@ -84,20 +106,11 @@ impl Lanes for Avx2 {
     fn slab(self, plane: __m256, slab: &Slab<__m256>) -> __m256 {
         self.0.fma._mm256_fmsub_ps(plane, slab.inverse, slab.offset)
     }
-    /// As integers, whose minima and maxima take one cycle instead of four: floats that are not negative order as
-    /// integers; a negative one is below them all, whichever negative one it is. So a negative entry becomes 0, and a
-    /// negative exit remains below every entry.
+    /// As integers: see [`Self::entry_and_exit`].
     #[inline(always)]
     fn overlap(self, near: [__m256; 3], far: [__m256; 3], t_max: __m256) -> (__m256, __m256) {
         let (avx, avx2) = (self.0.avx, self.0.avx2);
-        let entry = avx2._mm256_max_epi32(
-            avx2._mm256_max_epi32(cast(near[0]), cast(near[1])),
-            avx2._mm256_max_epi32(cast(near[2]), avx._mm256_setzero_si256()),
-        );
-        let exit = avx2._mm256_min_epi32(
-            avx2._mm256_min_epi32(cast(far[0]), cast(far[1])),
-            avx2._mm256_min_epi32(cast(far[2]), cast(t_max)),
-        );
+        let (entry, exit) = self.entry_and_exit(near, far, t_max);
         let apart = avx2._mm256_cmpgt_epi32(entry, exit);
         let all = avx._mm256_set1_epi32(ALL_BITS);
         (cast(avx2._mm256_xor_si256(apart, all)), cast(entry))

@@ -48,6 +48,8 @@ mod holes;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86;
+#[cfg(target_arch = "x86_64")]
+mod lanes_x86_512;
 mod node;
 mod part;
 mod ray_frame;
