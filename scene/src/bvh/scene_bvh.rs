@@ -149,7 +149,7 @@ impl SceneBvh {
         self.parts().map(|bvh| bvh.ignored as usize).sum()
     }
 
-    /// Instruction set in use: `"avx2"` (with FMA) or `"portable"`.
+    /// Instruction set in use: `"avx512"` (on eight lanes), `"avx2"` (with FMA) or `"portable"`.
     pub fn instruction_set(&self) -> &'static str {
         self.instructions.name()
     }
