@@ -173,8 +173,8 @@ impl<const ANY: bool> Query<'_, ANY> {
         match self.scene.parts.as_slice() {
             [part] if ONE => {
                 let bvh = &*part.bvh;
-                let tree = (bvh.nodes.as_slice(), bvh.root);
-                walk::<L, _, ANY>(l, tree, bvh.packets.as_slice(), &ray, stack, &mut nearest);
+                let tree = (&*bvh.nodes, bvh.root);
+                walk::<L, _, ANY>(l, tree, &*bvh.packets, &ray, stack, &mut nearest);
             }
             _ if ONE => {}
             parts => {
@@ -202,7 +202,7 @@ impl<L: Lanes> Leaves<L> for [Part] {
         nearest: &mut Nearest,
     ) {
         let bvh = &*self[index as usize].bvh;
-        let tree = (bvh.nodes.as_slice(), bvh.root);
-        walk::<L, _, ANY>(l, tree, bvh.packets.as_slice(), ray, stack, nearest);
+        let tree = (&*bvh.nodes, bvh.root);
+        walk::<L, _, ANY>(l, tree, &*bvh.packets, ray, stack, nearest);
     }
 }

@@ -27,8 +27,9 @@
 //! one packet, up to eight triangles as structure of arrays with their numbers, 320 bytes. Triangles are stored by
 //! position: one hit reads no index or vertex buffer. Sponza's packets hold 4.6 triangles on average: **about 80 bytes a
 //! triangle** with nodes (at best 45, at worst 320 for single triangles). Building takes about 250 bytes a triangle
-//! for the while. A part is one such tree; several parts hang under a small tree of the same nodes; all is world space,
-//! so nothing is transformed on the way. The stack is a fixed array of each thread; building bounds the depth
+//! for the while. Lists of half a megabyte and more fill whole large pages (2 MB each). A part is one such tree; several
+//! parts hang under a small tree of the same nodes; all is world space, so nothing is transformed on the way. The stack is
+//! a fixed array of each thread; building bounds the depth
 //! (`MAX_DEPTH`) by halving lists below a certain level, so that it cannot overflow.
 //!
 //! # Where it leaves its models
@@ -51,6 +52,7 @@ mod lanes_x86;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86_512;
 mod node;
+mod pages;
 mod part;
 mod ray_frame;
 mod refit;

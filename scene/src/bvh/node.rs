@@ -9,18 +9,21 @@ pub(super) const LEAF: u32 = 1 << 31;
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Boxes and references of up to eight children: 256 bytes, four cache lines.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// Coordinates by axis, then lower and upper; unused slots are inverted infinite boxes.
     pub(super) bounds: [[F32x8; 2]; 3],
     pub(super) children: U32x8,
+    /// Fills the last cache line.
+    unused: [u32; WIDTH],
 }
 
 impl Node {
     pub(super) const EMPTY: Self = Self {
         bounds: [[F32x8([f32::INFINITY; WIDTH]), F32x8([f32::NEG_INFINITY; WIDTH])]; 3],
         children: U32x8([NONE; WIDTH]),
+        unused: [0; WIDTH],
     };
 
     pub(super) fn set(&mut self, slot: usize, reference: u32, lo: [f32; 3], hi: [f32; 3]) {

@@ -12,6 +12,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use super::collapse::collapse;
 use super::lanes::WIDTH;
 use super::node::{NONE, Node};
+use super::pages::Pages;
 use super::refit::surface_cost;
 use super::split::split;
 use super::triangle::{Packet, is_solid};
@@ -31,8 +32,8 @@ const LARGEST_STACK: usize = 64;
 /// The ray-tracing structure of one part: world-space triangles under eight-wide nodes.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    pub(super) nodes: Vec<Node>,
-    pub(super) packets: Vec<Packet>,
+    pub(super) nodes: Pages<Node>,
+    pub(super) packets: Pages<Packet>,
     pub(super) root: u32,
     pub(super) lo: Vec3,
     pub(super) hi: Vec3,
@@ -73,8 +74,8 @@ impl Bvh {
         let bounds = boxes.iter().fold(Aabb::INVALID, |all, b| all.union(b));
         let built_cost = surface_cost(&wide.nodes, bounds.min.into(), bounds.max.into());
         Self {
-            nodes: wide.nodes,
-            packets,
+            nodes: wide.nodes.into(),
+            packets: packets.into(),
             root: wide.root,
             lo: bounds.min.into(),
             hi: bounds.max.into(),

@@ -28,12 +28,12 @@ impl Bvh {
         }
         let mut packets = Vec::with_capacity(self.packets.len());
         let mut packet_bounds = Vec::with_capacity(self.packets.len());
-        for packet in &self.packets {
+        for packet in self.packets.iter() {
             let (moved, bounds) = moved(packet, vertices, triangles)?;
             packets.push(moved);
             packet_bounds.push(bounds);
         }
-        let mut nodes = self.nodes.clone();
+        let mut nodes = self.nodes.to_vec();
         let mut node_bounds = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); nodes.len()];
         // Children come after their parents.
         for (index, node) in nodes.iter_mut().enumerate().rev() {
@@ -56,7 +56,7 @@ impl Bvh {
         let (lo, hi) = node_bounds[self.root as usize];
         // A cost that is not a number is not good either.
         let is_good = surface_cost(&nodes, lo, hi) <= WORST_COST * self.built_cost;
-        is_good.then_some(Self { nodes, packets, lo, hi, ..*self })
+        is_good.then(|| Self { nodes: nodes.into(), packets: packets.into(), lo, hi, ..*self })
     }
 }
 

@@ -7,7 +7,7 @@ use super::lanes::{F32x8, Lanes, U32x8, WIDTH};
 use super::ray_frame::{MAX_COORDINATE, RayFrame, TRIANGLE_PAD};
 
 /// Up to eight triangles; unused lanes are NaN and never hit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Packet {
     /// Coordinates by vertex and axis.

@@ -104,12 +104,24 @@ fn validate_notices_what_is_broken() {
         change(Arc::make_mut(&mut scene.parts[0].bvh));
         scene.validate().unwrap_err()
     };
-    assert!(matches!(broken(|b| b.nodes[0].children.0[0] = 9_999), BvhError::Reference { .. }));
-    assert!(matches!(broken(|b| b.nodes[0].bounds[1][1].0[0] -= 0.5), BvhError::NotEnclosed { .. }));
-    assert!(matches!(broken(|b| b.packets[3].ids.0[0] = 100_000), BvhError::Triangle { .. }));
+    assert!(matches!(broken(|b| b.nodes.short()[0].children.0[0] = 9_999), BvhError::Reference { .. }));
+    assert!(matches!(broken(|b| b.nodes.short()[0].bounds[1][1].0[0] -= 0.5), BvhError::NotEnclosed { .. }));
+    assert!(matches!(broken(|b| b.packets.short()[3].ids.0[0] = 100_000), BvhError::Triangle { .. }));
     assert!(matches!(broken(|b| b.triangles += 1), BvhError::TriangleCount { .. }));
-    assert!(matches!(broken(|b| b.nodes.push(b.nodes[0])), BvhError::Unreached { .. }));
-    assert!(matches!(broken(|b| b.packets.push(b.packets[0])), BvhError::Unreached { .. }));
+    assert!(matches!(
+        broken(|b| {
+            let node = b.nodes[0];
+            b.nodes.short().push(node)
+        }),
+        BvhError::Unreached { .. }
+    ));
+    assert!(matches!(
+        broken(|b| {
+            let packet = b.packets[0];
+            b.packets.short().push(packet)
+        }),
+        BvhError::Unreached { .. }
+    ));
     let mut lost = whole.clone();
     lost.root = crate::bvh::node::NONE;
     assert!(matches!(lost.validate(), Err(BvhError::PartMissing { part: 0 })));
