@@ -66,7 +66,7 @@ fn masks_cut_holes() {
     assert_eq!(is_there(&scene(&format!("{both}d 0.5\n"), pictures)), [true, false, true, false]);
     assert_eq!(is_there(&scene(&format!("{both}Tr 0.6\n"), pictures)), [false; 4]);
     for scene in [&alone, &masked] {
-        assert!(scene.notices.iter().all(|n| !n.contains("map_d") && !n.contains(" d = ")));
+        assert!(scene.notices.iter().all(|n| !n.contains("map_d") && !n.contains(" d is ")));
     }
 }
 
@@ -78,9 +78,9 @@ fn what_is_not_read_of_dissolve_is_told() {
         assert_eq!(found, 1, "{expected}: {:?}", scene.notices);
         assert_eq!(is_there(&scene), [true; 4], "{mtl}");
     };
-    let opaque = "it is opaque; `transmit` lets light pass";
-    told("d 0.25\n", &[], &format!("material \"paint\": d = 0.25 is not read: {opaque}"));
-    told("Tr 0.75\n", &[], &format!("material \"paint\": d = 0.25 is not read: {opaque}"));
+    let opaque = "d is not read: it is opaque, not 0.25; `transmit` lets light pass";
+    told("d 0.25\n", &[], &format!("material \"paint\": {opaque}"));
+    told("Tr 0.75\n", &[], &format!("material \"paint\": {opaque}"));
     let grey = file(RgbImage::from_pixel(1, 1, Rgb([128; 3])), ImageFormat::Png);
     let pictures: &[(&str, &[u8])] = &[("mask.png", &left()), ("grey.png", &grey)];
     told(

@@ -305,6 +305,29 @@ fn shearing_is_told() {
     assert_corners(&at(&scene, 0.25), "it/slanted/paint", &square_of(turned));
 }
 
+/// Normals turn with their node, and stretch as normals do: of (1, 1, 1) on a node of scale (2, 1, 1) that turns about y.
+#[test]
+fn normals_ride_along() {
+    let mut n = Numbers::default();
+    let times = n.add(&[[0.0], [1.0]]);
+    let turn = n.add(&[about(DVec3::Y, 0.0), about(DVec3::Y, 90.0)]);
+    let leaning = n.add(&[[1.0, 1.0, 1.0]; 5]);
+    let nodes = json!([{ "name": "sign", "mesh": 0, "scale": [2, 1, 1] }]);
+    let animations =
+        json!([{ "channels": [channel(0, 0, "rotation")], "samplers": [sampler(times, turn, "LINEAR")] }]);
+    let mut file = animated(nodes, animations, &n);
+    file["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(leaning);
+    let scene = Files::new(&file).scene();
+    for time in [0.0, 0.5] {
+        let moved = at(&scene, time);
+        let object = &moved.objects[0];
+        let found = (object.world_from_own_normal * moved.geometry.own_normals[0]).normalize();
+        let expected = DQuat::from_rotation_y(FRAC_PI_2 * time) * DVec3::new(0.5, 1.0, 1.0).normalize();
+        // f32, a few roundings.
+        assert!(found.distance(expected.as_vec3()) < 1e-6, "{found} {expected}");
+    }
+}
+
 /// An emitting square on an arm shines from where it is.
 #[test]
 fn emitters_ride_along() {

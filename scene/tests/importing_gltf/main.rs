@@ -4,6 +4,7 @@
 mod animations;
 mod bad;
 mod cameras;
+mod colours;
 mod files;
 mod geometry;
 mod surfaces;

@@ -186,7 +186,6 @@ fn what_is_passed_over_is_told_once() {
         ("/materials/0/alphaMode", json!("BLEND")),
         ("/materials/0/pbrMetallicRoughness/metallicFactor", json!(1.0)),
         ("/meshes/0/primitives/0/targets", json!([{ "POSITION": 0 }])),
-        ("/meshes/0/primitives/0/attributes/COLOR_0", json!(0)),
         // A body without size beside one with.
         (
             "/nodes",
@@ -196,7 +195,6 @@ fn what_is_passed_over_is_told_once() {
     for expected in [
         "object \"it\": extensions are passed over: KHR_materials_clearcoat",
         "object \"it\": morph targets are not read",
-        "object \"it\": colours of vertices are not read",
         "object \"it\": material \"paint\": what is blended is opaque; `transmit` lets light pass where it is clear",
         "object \"it\": all surfaces are matt: metal, roughness and normal maps are passed over",
         "object \"it/dot/paint\": no triangle has an area; it was left out",
@@ -208,6 +206,6 @@ fn what_is_passed_over_is_told_once() {
             scene.notices
         );
     }
-    assert_eq!(scene.notices.len(), 6);
+    assert_eq!(scene.notices.len(), 5);
     assert_eq!(names(&scene), ["it/square/paint"]);
 }

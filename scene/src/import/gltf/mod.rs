@@ -11,6 +11,7 @@ mod names;
 mod nodes;
 mod primitive;
 mod unmodelled;
+mod vertex_colours;
 
 use super::{
     Frame, Group, Import, Loaded, MAX_TRIANGLES, Terms,
@@ -25,6 +26,7 @@ use glam::DVec3;
 use materials::Materials;
 pub(super) use primitive::MAX_UV;
 use std::{collections::BTreeMap, path::Path};
+use vertex_colours::Palettes;
 
 /// Lumens of a watt, which candela, lux and nits of a file are divided by. Source: the definition of the candela (SI).
 const LUMENS_PER_WATT: f64 = 683.0;
@@ -63,6 +65,7 @@ fn load(
     let played = animations::read(&root, &accessors, &placed.nodes, animation, &mut notices)?;
 
     let mut materials = Materials::new(&root);
+    let mut palettes = Palettes::new(&root);
     let mut groups: BTreeMap<(String, String), Group> = BTreeMap::new();
     let mut left = MAX_TRIANGLES;
     let mut points_and_lines = 0;
@@ -84,6 +87,9 @@ fn load(
             let (material, found) = materials.of(primitive, &accessors, &mut beside)?;
             let mut surface = primitive::read(primitive, &accessors, left, found.uvs).map_err(at)?;
             left -= surface.read;
+            if palettes.paints(primitive, found.uvs.is_some()) {
+                palettes.paint(&mut surface, primitive, &accessors, &material).map_err(at)?;
+            }
             if is_mirrored {
                 surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
@@ -103,6 +109,7 @@ fn load(
         }
     }
     groups.retain(|_, group| !group.mesh.triangles.is_empty());
+    notices.extend(palettes.finish(&mut groups, &mut materials.read));
     if points_and_lines > 0 {
         notices.push(format!("{points_and_lines} primitives of points or lines are passed over"));
     }

@@ -38,6 +38,8 @@ pub(super) struct Surface {
     pub(super) uvs: Vec<Vec2>,
     /// Normals of the vertices as the file has them, where it has them.
     pub(super) normals: Vec<DVec3>,
+    /// The numbers of the vertices in the primitive.
+    pub(super) sources: Vec<u32>,
     /// How many were looked at, those that only turn a strip included.
     pub(super) read: usize,
 }
@@ -115,6 +117,7 @@ pub(super) fn read(
         surface.triangles.push(triangle.map(|n| {
             *own.entry(n).or_insert_with(|| {
                 surface.vertices.push(DVec3::from_array(positions.get(n)));
+                surface.sources.push(n);
                 if let Some((elements, uvs)) = &coordinates {
                     surface.uvs.push(uvs.of(elements.get(n)));
                 }

@@ -1,6 +1,6 @@
 //! Turns what a glTF file has beyond what is modelled into an error, or one notice each.
 
-use gltf::json::{Root, validation::Checked};
+use gltf::json::Root;
 
 /// Extensions that are read.
 const READ: &[&str] = &[
@@ -40,19 +40,12 @@ pub(super) fn check(root: &Root) -> Result<Vec<String>, String> {
         notices.push(format!("extensions are passed over: {}", unread.join(", ")));
     }
     let primitives = || root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let has_colours = primitives().any(|primitive| {
-        primitive
-            .attributes
-            .keys()
-            .any(|key| matches!(key, Checked::Valid(gltf::json::mesh::Semantic::Colors(_))))
-    });
     for (is_there, what) in [
         (!root.skins.is_empty(), "skins are not read: meshes stand as they were modelled"),
         (
             primitives().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty())),
             "morph targets are not read",
         ),
-        (has_colours, "colours of vertices are not read"),
         (
             root.cameras.iter().any(|camera| camera.orthographic.is_some()),
             "orthographic cameras are passed over",

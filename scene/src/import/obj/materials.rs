@@ -64,7 +64,7 @@ impl Surfaces<'_> {
         let (texture, map) = self.texture(material, dissolve).unzip();
         if dissolve < 1.0 && texture.as_ref().is_none_or(|texture: &Texture| texture.cutoff.is_none()) {
             self.note(format!(
-                "material \"{}\": d = {dissolve} is not read: it is opaque; `transmit` lets light pass",
+                "material \"{}\": d is not read: it is opaque, not {dissolve}; `transmit` lets light pass",
                 material.name
             ));
         }
