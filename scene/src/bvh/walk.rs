@@ -142,9 +142,8 @@ pub(super) fn walk<L: Lanes, V: Leaves<L> + ?Sized, const ANY: bool>(
                     stack.distances[top..top + WIDTH].copy_from_slice(&near.0);
                     top += bits.count_ones() as usize - 1;
                     current = stack.references[top];
-                    for &pushed in &stack.references[top + 1 - bits.count_ones() as usize..top] {
-                        prefetch(l, nodes, leaves, pushed);
-                    }
+                    // Those behind the next wait long enough to be asked for when they are the next.
+                    prefetch(l, nodes, leaves, stack.references[top - 1]);
                 }
                 continue;
             }
