@@ -150,7 +150,7 @@ record! {
 record! {
     /// A light source, for direct light in the renderer.
     LightRecord, 128 {
-        /// 0 point, 1 spot, 2 directional, 3 parallelogram, 4 triangle, 5 sky.
+        /// 0 point, 1 spot, 2 directional, 3 parallelogram, 4 triangle, 5 sky, 6 all triangles of `object`.
         kind: u32,
         /// 1 while switched on, else 0.
         enabled: u32,

@@ -131,7 +131,7 @@ impl Renderer {
                 &scene.lights,
                 scene.bounds,
                 view.light_samples,
-                with_maps,
+                view.shadows,
                 // Triangles with holes are not told by their names alone.
                 scene.geometry.is_readable(&self.gpu) && holes.is_none(),
                 view.sample,

@@ -1,11 +1,18 @@
 //! Turns lights into the table that shaders read, and into the views from which their shadow maps are drawn.
 
-use crate::layout::{AREA_FACES, LightUniform, MAP_SEED, NO_LAYER, ShadowView};
+use crate::{
+    Shadows,
+    layout::{AREA_FACES, LightUniform, MAP_SEED, NO_LAYER, ShadowView},
+};
 use core::f32::consts::PI;
 use glam::{Mat4, Vec3, Vec4};
 use photonstream_scene::SceneLight;
 use photonstream_shading::{
-    LightShape, Sky, basis, light::Bounds, sobol::Sequence, surface::RELATIVE_OFFSET, wgsl,
+    LightShape, Sky, basis,
+    light::{Bounds, EmissiveMesh},
+    sobol::Sequence,
+    surface::RELATIVE_OFFSET,
+    wgsl,
 };
 
 /// Most shadow maps of a scene: layers of one texture.
@@ -26,12 +33,13 @@ pub(crate) struct LightTable {
 
 impl LightTable {
     /// The table of `lights`; area lights have maps around up to `points` of their points, a sky those of up to four times as
-    /// many directions, which are others for each `sample`; the maps of others name triangles where `maps_are_named`.
+    /// many directions, which are others for each `sample`; the maps of others name triangles where `maps_are_named`. For
+    /// `shadows` by rays, emitting meshes have all their triangles, else as many points as an area light.
     pub(crate) fn new(
         lights: &[SceneLight],
         bounds: Bounds,
         points: u32,
-        with_maps: bool,
+        shadows: Shadows,
         maps_are_named: bool,
         sample: u32,
     ) -> Self {
@@ -50,6 +58,7 @@ impl LightTable {
             13..=48 => 512,
             _ => 256,
         };
+        let with_maps = shadows == Shadows::Maps;
         let mut suns = Vec::new();
         for (index, light) in lights.iter().enumerate() {
             let shape = &light.light.shape;
@@ -64,18 +73,30 @@ impl LightTable {
             if let LightShape::Sky { sky } = shape {
                 suns.push((index, sky_suns(sky, light.light.power, index, points * SKY_POINTS, sample)));
             }
+            if let LightShape::Mesh { mesh } = shape {
+                let sequence = Sequence::new(MAP_SEED.into(), index as u32);
+                let parts = match shadows {
+                    Shadows::Rays => mesh_triangles(mesh),
+                    _ => (0..points).map(|k| mesh_point(mesh, sequence.sample(k.into()).next_2d())).collect(),
+                };
+                suns.push((index, parts));
+            }
             (entry.first_map, entry.maps, entry.map_points) = (first_map, maps, points);
             if maps > 0 {
                 let sample_of =
                     |k: u32| Sequence::new(MAP_SEED.into(), index as u32).sample(k.into()).next_2d();
                 views(shape, &entry, bounds, table.resolution, points, sample_of, &mut table.views);
-                if let Some((_, suns)) = suns.last_mut().filter(|(of, _)| *of == index) {
-                    let beams = suns.iter_mut().zip(first_map..);
-                    beams.for_each(|(sun, map)| {
-                        let direction = Vec3::from(sun.direction);
-                        table.views.push(beam_view(direction, bounds, table.resolution));
-                        (sun.first_map, sun.maps) = (map, 1);
-                    });
+                if let Some((_, parts)) = suns.last_mut().filter(|(of, _)| *of == index) {
+                    for part in parts {
+                        part.first_map = table.views.len() as u32;
+                        if shape.sky().is_some() {
+                            let direction = Vec3::from(part.direction);
+                            table.views.push(beam_view(direction, bounds, table.resolution));
+                        } else {
+                            table.views.extend(emitter_views(part, bounds, table.resolution));
+                        }
+                        part.maps = table.views.len() as u32 - part.first_map;
+                    }
                 }
                 if maps_are_named && shape.is_delta() {
                     for view in &mut table.views[first_map as usize..] {
@@ -114,6 +135,37 @@ fn sky_suns(sky: &Sky, power: Vec3, index: usize, count: u32, sample: u32) -> Ve
     (0..count).map(sun).collect()
 }
 
+/// Triangles of a mesh that rays choose among; of more, so many that are drawn by their areas stand for all.
+const MESH_TRIANGLES: usize = 1 << 16;
+
+/// The triangles of a mesh, each with the running sum of the shares of the area in the place of its outer versine.
+fn mesh_triangles(mesh: &EmissiveMesh) -> Vec<LightUniform> {
+    let part = |triangle: usize, cumulative: f32| {
+        let [corner, b, c] = mesh.triangles()[triangle];
+        let shape = LightShape::Triangle { corner, edge_u: b - corner, edge_v: c - corner };
+        LightUniform { versine_outer: cumulative, ..light_uniform(&shape, Vec3::ZERO) }
+    };
+    let count = mesh.triangles().len();
+    if count <= MESH_TRIANGLES {
+        return mesh.cumulative().iter().enumerate().map(|(i, &sum)| part(i, sum)).collect();
+    }
+    let share = |k: usize| (k as f32 + 0.5) / MESH_TRIANGLES as f32;
+    let end = |k: usize| (k + 1) as f32 / MESH_TRIANGLES as f32;
+    (0..MESH_TRIANGLES).map(|k| part(mesh.place([share(k), 0.5]).triangle, end(k))).collect()
+}
+
+/// A point of a mesh as an emitter of no extent, turned as its triangle.
+fn mesh_point(mesh: &EmissiveMesh, u: [f32; 2]) -> LightUniform {
+    let place = mesh.place(u);
+    let [a, b, c] = mesh.triangles()[place.triangle];
+    let shape = LightShape::Parallelogram { corner: place.point, edge_u: b - a, edge_v: c - a };
+    let mut part = light_uniform(&shape, Vec3::ZERO);
+    part.edge_v = [0.0; 3];
+    // The point is off the surface already.
+    part.emitter_offset = 0.0;
+    part
+}
+
 /// Half angle (as its cosine) up to which a spot has one map; wider ones have a cube.
 const SINGLE_MAP_COS: f32 = 0.35;
 
@@ -128,7 +180,9 @@ fn maps_of(shape: &LightShape, points: u32) -> u32 {
             }
         }
         LightShape::Directional { .. } => 1,
-        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => AREA_FACES * points,
+        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Mesh { .. } => {
+            AREA_FACES * points
+        }
         LightShape::Sky { .. } => SKY_POINTS * points,
     }
 }
@@ -145,7 +199,7 @@ pub(crate) fn light_uniform(shape: &LightShape, power: Vec3) -> LightUniform {
             (entry.versine_inner, entry.versine_outer) = (versine_inner, versine_outer);
         }
         LightShape::Directional { direction } => entry.direction = direction.to_array(),
-        LightShape::Sky { .. } => {}
+        LightShape::Sky { .. } | LightShape::Mesh { .. } => {}
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
             entry.position = corner.to_array();
@@ -181,8 +235,8 @@ fn views(
     let near = bounds.radius.max(f32::MIN_POSITIVE) * 1e-4;
     match *shape {
         LightShape::Directional { direction } => out.push(beam_view(direction, bounds, resolution)),
-        // Its directions are lights of their own.
-        LightShape::Sky { .. } => {}
+        // Their directions and points are lights of their own.
+        LightShape::Sky { .. } | LightShape::Mesh { .. } => {}
         LightShape::Spot { position, direction, versine_outer, .. } if entry.maps == 1 => {
             let cos = 1.0 - versine_outer;
             let tan = (versine_outer * (2.0 - versine_outer)).sqrt() / cos;
@@ -200,26 +254,36 @@ fn views(
         }
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
-            let normal = shape.emitter_normal();
-            let across = edge_u.normalize_or(Vec3::X);
             for k in 0..points {
                 let u = sample(k);
                 let [a, b] = match shape {
                     LightShape::Triangle { .. } => photonstream_shading::sampling::triangle(u),
                     _ => u,
                 };
+                let normal = shape.emitter_normal();
                 let position = corner + edge_u * a + edge_v * b + normal * entry.emitter_offset;
-                let frame = Frame { position, right: across, up: normal.cross(across), forward: normal };
-                // All faces but the one behind the emitter.
-                let [right, left, above, below, ahead, _] = faces(&frame);
-                out.extend(
-                    [right, left, above, below, ahead]
-                        .iter()
-                        .map(|f| perspective_view(f, margin, near, resolution)),
-                );
+                out.extend(half_cube([position, normal, edge_u], near, resolution));
             }
         }
     }
+}
+
+/// The views from a point of an emitter.
+fn emitter_views(point: &LightUniform, bounds: Bounds, resolution: u32) -> [ShadowView; AREA_FACES as usize] {
+    let near = bounds.radius.max(f32::MIN_POSITIVE) * 1e-4;
+    half_cube([point.position, point.direction, point.edge_u].map(Vec3::from), near, resolution)
+}
+
+/// All faces of a cube around a point but the one behind its emitter.
+fn half_cube(
+    [position, normal, edge]: [Vec3; 3],
+    near: f32,
+    resolution: u32,
+) -> [ShadowView; AREA_FACES as usize] {
+    let across = edge.normalize_or(Vec3::X);
+    let frame = Frame { position, right: across, up: normal.cross(across), forward: normal };
+    let [right, left, above, below, ahead, _] = faces(&frame);
+    [right, left, above, below, ahead].map(|f| perspective_view(&f, margin(resolution), near, resolution))
 }
 
 /// The view of a beam that covers the whole scene.

@@ -50,6 +50,17 @@ fn arrive(@builtin(position) at: vec4f) -> @location(0) vec4f {
                     irradiance += arriving_from_sky(sun, surface);
                 }
             }
+        } else if light.kind == LIGHT_MESH {
+            if AREA_LIGHTS {
+                // Points that all pixels share: each is a light of its own.
+                var sum = vec3f(0.0);
+                for (var k = 0u; k < light.map_points; k++) {
+                    var part = lights[light.first_direction + k];
+                    part.power = light.power;
+                    sum += arriving(part, surface, origin, vec2f(0.0), part.first_map);
+                }
+                irradiance += sum / f32(light.map_points);
+            }
         } else if AREA_LIGHTS {
             // Points that all pixels share: each has its maps.
             var sum = vec3f(0.0);

@@ -94,7 +94,47 @@ fn trace_direct(@builtin(global_invocation_id) id: vec3u) {
     pixels[slot] = state;
 }
 
-fn ask(light: Light, surface: Surface, origin: vec3f, u: vec2f) -> Question {
+// A triangle among the lights, and what is left to choose a point there.
+struct MeshChoice {
+    index: u32,
+    rest: f32,
+}
+
+// The triangle of a mesh that `u` chooses; twin of EmissiveMesh::place.
+fn mesh_choice(light: Light, u: f32) -> MeshChoice {
+    // The first whose running sum is above: a search in a loop.
+    var low = 0u;
+    var high = light.map_points - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if lights[light.first_direction + middle].versine_outer > u {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let end = lights[light.first_direction + low].versine_outer;
+    var before = 0.0;
+    if low > 0u {
+        before = lights[light.first_direction + low - 1u].versine_outer;
+    }
+    var rest = 0.5;
+    if end > before {
+        rest = clamp((u - before) / (end - before), 0.0, ONE_MINUS_EPSILON);
+    }
+    return MeshChoice(light.first_direction + low, rest);
+}
+
+fn ask(asked_light: Light, surface: Surface, origin: vec3f, asked_place: vec2f) -> Question {
+    var light = asked_light;
+    var u = asked_place;
+    if light.kind == LIGHT_MESH {
+        walk_turns += MESH_TURNS;
+        let choice = mesh_choice(light, u.x);
+        u.x = choice.rest;
+        light = lights[choice.index];
+        light.power = asked_light.power;
+    }
     if light.kind == LIGHT_SKY {
         // Its rows and columns are looked up in loops.
         walk_turns += SKY_TURNS;

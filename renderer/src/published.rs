@@ -139,7 +139,12 @@ fn lights(scene: &Scene, records: &[LightRecord]) -> Result<Vec<Published>, Rend
 
 fn put_lights(scene: &mut Scene, lights: Vec<Published>) {
     for (target, (light, enabled, object)) in scene.lights.iter_mut().zip(lights) {
-        (target.light, target.enabled, target.object) = (light, enabled, object);
+        (target.enabled, target.object) = (enabled, object);
+        match (&target.light.shape, &light.shape) {
+            // It is where its object is.
+            (LightShape::Mesh { .. }, LightShape::Mesh { .. }) => target.light.power = light.power,
+            _ => target.light = light,
+        }
     }
 }
 
@@ -181,9 +186,11 @@ fn light(index: usize, record: &LightRecord, loaded: &LightShape) -> Result<Ligh
         3 => LightShape::Parallelogram { corner: position, edge_u, edge_v },
         4 => LightShape::Triangle { corner: position, edge_u, edge_v },
         5 if loaded.sky().is_some() => loaded.clone(),
+        6 if matches!(loaded, LightShape::Mesh { .. }) => loaded.clone(),
+        6 => return Err(wrong("kind", "6, a mesh".into(), "what the scene's text has in this place")),
         5 => return Err(wrong("kind", "5, a sky".into(), "what the scene's text has in this place")),
         kind => {
-            return Err(wrong("kind", kind.to_string(), "0 to 5; this renderer is older than the simulator"));
+            return Err(wrong("kind", kind.to_string(), "0 to 6; this renderer is older than the simulator"));
         }
     };
     let power = finite("power", record.power)?;

@@ -9,7 +9,11 @@ use crate::{
     scene::{Geometry, Material, MaterialId, Object, ObjectId, Sides},
 };
 use glam::{DVec3, Vec2, Vec3};
-use photonstream_shading::{LightShape, light::Bounds, surface};
+use photonstream_shading::{
+    LightShape,
+    light::{Bounds, EmissiveMesh},
+    surface,
+};
 
 /// Most vertices and most triangles of a scene: their indices are u32.
 const MAX_ELEMENTS: usize = 1 << 28;
@@ -36,6 +40,13 @@ pub(crate) struct Emitter {
     pub(crate) faces: Vec<EmitterFace>,
 }
 
+impl Emitter {
+    /// How many lights it makes at most.
+    pub(crate) fn lights(&self) -> usize {
+        if self.faces.len() > MOST_FACES { 1 } else { self.faces.len() }
+    }
+}
+
 /// How much light an emitter's faces emit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Strength {
@@ -52,11 +63,23 @@ pub(crate) enum EmitterFace {
     Triangle([u32; 3]),
 }
 
-/// An object that emits: its faces with an area, and the lights they make.
+/// What of an object a light shines from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Emitting {
+    /// One of several faces, each a light of its own.
+    Face(EmitterFace),
+    /// All its triangles.
+    Mesh,
+}
+
+/// Most faces of an object that are lights of their own; those of more are one light.
+const MOST_FACES: usize = 16;
+
+/// An object that emits: what of it has an area, and the lights that makes.
 pub(crate) struct BakedEmitter {
     pub(crate) object: ObjectId,
     pub(crate) strength: Strength,
-    pub(crate) lights: Vec<(EmitterFace, LightShape)>,
+    pub(crate) lights: Vec<(Emitting, LightShape)>,
 }
 
 /// The geometry of a scene.
@@ -152,9 +175,15 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
             ));
         }
         if let Some(emitter) = &part.emitter {
-            let shapes =
-                emitter.faces.iter().map(|face| (*face, rest.light_shape(*face, &pose, &soup.vertices)));
-            let lights = shapes.filter(|(_, shape)| shape.area() > 0.0).collect();
+            let lights: Vec<(Emitting, LightShape)> = if emitter.lights() < emitter.faces.len() {
+                let triangles = soup.triangles[first_triangle as usize..].iter();
+                let shape = mesh_shape(triangles.map(|t| t.map(|v| soup.vertices[v as usize])));
+                shape.map(|shape| (Emitting::Mesh, shape)).into_iter().collect()
+            } else {
+                let shape = |face| (Emitting::Face(face), rest.light_shape(face, &pose, &soup.vertices));
+                let shapes = emitter.faces.iter().copied().map(shape);
+                shapes.filter(|(_, shape)| shape.area() > 0.0).collect()
+            };
             emitters.push(BakedEmitter { object: id, strength: emitter.strength, lights });
         }
         objects.push(Object {
@@ -172,6 +201,11 @@ pub(crate) fn bake(parts: Vec<Part<'_>>, origin: DVec3, materials: &[Material]) 
     }
     let bounds = sphere_around(&soup.vertices);
     Ok(Baked { geometry: soup.into_geometry(), objects, rest_meshes, poses, emitters, bounds, notices })
+}
+
+/// The shape of the light that triangles make together; `None` if none has an area.
+pub(crate) fn mesh_shape(triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<LightShape> {
+    EmissiveMesh::new(triangles).map(|mesh| LightShape::Mesh { mesh: mesh.into() })
 }
 
 /// The index of `name` in the ordered list of materials.

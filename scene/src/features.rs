@@ -66,7 +66,10 @@ impl Features {
             spot_lights: count(|s| matches!(s, LightShape::Spot { .. })),
             directional_lights: count(|s| matches!(s, LightShape::Directional { .. })),
             area_lights: count(|s| {
-                matches!(s, LightShape::Parallelogram { .. } | LightShape::Triangle { .. })
+                matches!(
+                    s,
+                    LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Mesh { .. }
+                )
             }),
             skies: count(|s| s.sky().is_some()),
             light_columns: light_columns.min(lights.len() as u32),

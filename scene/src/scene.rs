@@ -2,7 +2,7 @@
 
 use crate::{
     animation::Animation,
-    bake::{EmitterFace, Strength},
+    bake::{Emitting, Strength},
     bvh::SceneBvh,
     config::LightConfig,
     features::Features,
@@ -169,8 +169,8 @@ pub struct SceneLight {
     pub object: Option<ObjectId>,
     /// What the config says of it, and edits since; `None` for lights with a surface.
     pub(crate) written: Option<LightConfig>,
-    /// The face of `object` that emits, and how much.
-    pub(crate) face: Option<(EmitterFace, Strength)>,
+    /// What of `object` emits, and how much.
+    pub(crate) face: Option<(Emitting, Strength)>,
 }
 
 /// All triangles of a scene; what does not change when objects move at their size is shared by all versions of the scene.

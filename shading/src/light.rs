@@ -5,6 +5,10 @@ use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 use std::sync::Arc;
 
+mod mesh;
+
+pub use mesh::{EmissiveMesh, EmissivePlace};
+
 /// A light source: a shape that says where light starts and how it spreads, and a power.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
@@ -58,6 +62,11 @@ pub enum LightShape {
         edge_u: Vec3,
         /// Second edge.
         edge_v: Vec3,
+    },
+    /// A diffuse emitter of many triangles, which all emit the same radiance from their fronts.
+    Mesh {
+        /// Its triangles.
+        mesh: Arc<EmissiveMesh>,
     },
     /// Light from infinitely far away in all directions.
     Sky {
@@ -155,6 +164,11 @@ impl LightShape {
             Self::Directional { direction } => {
                 Emission { origin: beam(bounds, direction, u), direction, weight: Vec3::ONE }
             }
+            Self::Mesh { ref mesh } => {
+                let place = mesh.place(u_position);
+                let direction = sampling::cosine_hemisphere(place.normal, u);
+                Emission { origin: place.point, direction, weight: Vec3::ONE }
+            }
             Self::Parallelogram { .. } | Self::Triangle { .. } => {
                 let normal = self.emitter_normal();
                 let origin = self.offset_emitter_point(u_position);
@@ -199,6 +213,10 @@ impl LightShape {
                 let distance = f32::INFINITY;
                 irradiance.is_finite().then_some(Illumination { wi: sample.wi, distance, irradiance })
             }
+            Self::Mesh { ref mesh } => {
+                let place = mesh.place(u);
+                from_position(place.point - x, |wi| FRAC_1_PI * place.normal.dot(-wi).max(0.0))
+            }
             Self::Parallelogram { .. } | Self::Triangle { .. } => {
                 let normal = self.emitter_normal();
                 from_position(self.offset_emitter_point(u) - x, |wi| FRAC_1_PI * normal.dot(-wi).max(0.0))
@@ -208,12 +226,16 @@ impl LightShape {
 
     /// Whether one sample of [`LightShape::illuminate`] is exact: all but area lights and skies.
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Self::Parallelogram { .. } | Self::Triangle { .. } | Self::Sky { .. })
+        !matches!(
+            self,
+            Self::Parallelogram { .. } | Self::Triangle { .. } | Self::Mesh { .. } | Self::Sky { .. }
+        )
     }
 
     /// Area of an emitter in m²; 0 for lights without one.
     pub fn area(&self) -> f32 {
         match *self {
+            Self::Mesh { ref mesh } => mesh.area(),
             Self::Parallelogram { edge_u, edge_v, .. } => {
                 edge_u.as_dvec3().cross(edge_v.as_dvec3()).length() as f32
             }
@@ -224,7 +246,7 @@ impl LightShape {
         }
     }
 
-    /// Unit normal of the emitting side; zero for lights without an area.
+    /// Unit normal of the emitting side; zero for lights without an area, and for meshes.
     #[inline]
     pub fn emitter_normal(&self) -> Vec3 {
         match *self {
@@ -242,7 +264,7 @@ impl LightShape {
             Self::Parallelogram { corner, edge_u, edge_v } => (corner, edge_u, edge_v, u),
             Self::Triangle { corner, edge_u, edge_v } => (corner, edge_u, edge_v, sampling::triangle(u)),
             Self::Point { position } | Self::Spot { position, .. } => return position,
-            Self::Directional { .. } | Self::Sky { .. } => return Vec3::ZERO,
+            Self::Directional { .. } | Self::Sky { .. } | Self::Mesh { .. } => return Vec3::ZERO,
         };
         let point = corner + edge_u * a + edge_v * b;
         surface::offset([corner, corner + edge_u, corner + edge_v], point, self.emitter_normal())

@@ -61,10 +61,11 @@ pub fn light_kind(shape: &LightShape) -> u32 {
         LightShape::Parallelogram { .. } => 3,
         LightShape::Triangle { .. } => 4,
         LightShape::Sky { .. } => 5,
+        LightShape::Mesh { .. } => 6,
     }
 }
 
-const LIGHT_KINDS: [&str; 6] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM", "TRIANGLE", "SKY"];
+const LIGHT_KINDS: [&str; 7] = ["POINT", "SPOT", "DIRECTIONAL", "PARALLELOGRAM", "TRIANGLE", "SKY", "MESH"];
 
 /// Number of a sky's kind in shaders.
 pub fn sky_kind(sky: &Sky) -> u32 {
@@ -117,6 +118,7 @@ pub fn tone_map_number(map: ToneMap) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::EmissiveMesh;
     use glam::{DVec3, Vec3};
 
     #[test]
@@ -136,6 +138,9 @@ mod tests {
             LightShape::Parallelogram { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
             LightShape::Triangle { corner: Vec3::ZERO, edge_u: Vec3::X, edge_v: Vec3::Y },
             LightShape::Sky { sky: Sky::gradient(DVec3::ONE, DVec3::ONE, DVec3::ONE).into() },
+            LightShape::Mesh {
+                mesh: EmissiveMesh::new([[Vec3::ZERO, Vec3::X, Vec3::Y]]).expect("it has an area").into(),
+            },
         ];
         for (shape, name) in shapes.iter().zip(LIGHT_KINDS) {
             assert!(text.contains(&format!("const LIGHT_{name}: u32 = {}u;", light_kind(shape))), "{text}");

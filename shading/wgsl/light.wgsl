@@ -13,7 +13,7 @@ struct Light {
     first_map: u32,        // its first shadow map
     maps: u32,             // number of its shadow maps
     map_points: u32,       // points of an area light that have maps
-    first_direction: u32,  // of a sky: where its directions that have maps begin among the lights
+    first_direction: u32,  // of a sky or mesh: where its directions, points or triangles begin among the lights
     pad_0: u32,
 }
 

@@ -216,6 +216,9 @@ pub(crate) fn reach_of(scene: &Scene) -> f32 {
     let position = |shape: &LightShape| match *shape {
         LightShape::Point { position } | LightShape::Spot { position, .. } => position.abs().max_element(),
         LightShape::Directional { .. } | LightShape::Sky { .. } => 0.0,
+        LightShape::Mesh { ref mesh } => {
+            mesh.triangles().iter().flatten().map(|v| v.abs().max_element()).fold(0.0, f32::max)
+        }
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
             corner.abs().max_element() + edge_u.length() + edge_v.length()

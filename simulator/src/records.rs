@@ -115,6 +115,8 @@ pub fn light_records(scene: &Scene) -> Vec<LightRecord> {
             match light.light.shape {
                 // Renderers have its radiances from the text.
                 LightShape::Sky { .. } => record.kind = 5,
+                // And its triangles from its object.
+                LightShape::Mesh { .. } => record.kind = 6,
                 LightShape::Point { position } => record.position = position.to_array(),
                 LightShape::Spot { position, direction, versine_inner, versine_outer } => {
                     record.kind = 1;

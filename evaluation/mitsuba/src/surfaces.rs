@@ -115,6 +115,6 @@ fn write_light(light: &Light, document: &mut Document) -> usize {
             1
         }
         // Emitted by their object.
-        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => 0,
+        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Mesh { .. } => 0,
     }
 }

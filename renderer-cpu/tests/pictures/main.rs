@@ -2,6 +2,7 @@
 
 mod attach;
 mod culling;
+mod emissive;
 mod gather;
 mod options_and_layers;
 mod reference_closed_forms;

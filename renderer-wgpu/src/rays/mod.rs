@@ -52,6 +52,8 @@ pub(crate) const RAY_TURNS: u32 = 3_800;
 const RAY_TURNS_FOR_NEW: u32 = 2_400;
 /// Turns that looking up a sample of a sky takes at most: two searches among 2¹⁴.
 const SKY_TURNS: u32 = 30;
+/// Turns that choosing a triangle of an emitting mesh takes at most: a search among 2¹⁶.
+const MESH_TURNS: u32 = 17;
 /// Unit round-off of `f32`.
 const ROUND_OFF: f32 = f32::EPSILON * 0.5;
 /// Padding of node boxes, in multiples of the distance of the scene's farthest corner: twice that of the scene's own
@@ -73,12 +75,14 @@ pub(crate) fn constants() -> String {
         ("RAY_TURNS", RAY_TURNS),
         ("RAY_TURNS_FOR_NEW", RAY_TURNS_FOR_NEW),
         ("SKY_TURNS", SKY_TURNS),
+        ("MESH_TURNS", MESH_TURNS),
     ];
     for (name, value) in seeds.into_iter().chain(turns) {
         text.push_str(&format!("const {name}: u32 = {value}u;\n"));
     }
     for (name, value) in [
         ("SHADOW_REACH", SHADOW_REACH),
+        ("ONE_MINUS_EPSILON", photonstream_shading::sampling::ONE_MINUS_EPSILON),
         ("TRIANGLE_PAD", TRIANGLE_PAD),
         ("NODE_PAD_DISTANCE", NODE_PAD_DISTANCE),
         ("NODE_PAD_ORIGIN", NODE_PAD_ORIGIN),

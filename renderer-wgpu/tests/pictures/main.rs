@@ -5,6 +5,7 @@ mod accumulations;
 mod against_cpu;
 mod approximations;
 mod edited;
+mod emissive;
 mod extremes;
 mod only_what_changed;
 mod scenes;

@@ -365,7 +365,9 @@ fn literal(shape: &LightShape) -> String {
             (position, direction, versines) = (p, d, [versine_inner, versine_outer]);
         }
         LightShape::Directional { direction: d } => direction = d,
-        LightShape::Sky { .. } => panic!("a sky is no light of its own in shaders"),
+        LightShape::Sky { .. } | LightShape::Mesh { .. } => {
+            panic!("skies and meshes are many lights in shaders")
+        }
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => {
             (position, direction, edges) = (corner, shape.emitter_normal(), [edge_u, edge_v]);

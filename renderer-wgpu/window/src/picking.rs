@@ -81,6 +81,7 @@ pub(crate) fn anchor(light: &Light) -> Option<Vec3> {
         LightShape::Directional { .. } | LightShape::Sky { .. } => None,
         LightShape::Parallelogram { corner, edge_u, edge_v } => Some(corner + 0.5 * (edge_u + edge_v)),
         LightShape::Triangle { corner, edge_u, edge_v } => Some(corner + (edge_u + edge_v) / 3.0),
+        LightShape::Mesh { ref mesh } => Some(mesh.place([0.5; 2]).point),
     }
 }
 

@@ -25,8 +25,8 @@ use std::{
 /// Albedo of imported faces without a material.
 const DEFAULT_ALBEDO: f64 = 0.5;
 
-/// Most emitting faces of an import: each is a light of its own. A triangle is a face, and so is a parallelogram.
-const MAX_EMITTING_FACES: usize = 1024;
+/// Most emitting lights of an import.
+const MAX_LIGHTS: usize = 1024;
 
 /// What importing one object needs and fills.
 pub(super) struct Context<'c, 'a> {
@@ -196,35 +196,35 @@ pub(super) fn read(
     Ok(())
 }
 
-/// Leaves an import the emitters of most power for each face, up to [`MAX_EMITTING_FACES`]; the others stay dark.
+/// Leaves an import the emitters of most power for each light, up to [`MAX_LIGHTS`] lights; the others stay dark.
 fn limit_emitters(parts: &mut [Part<'_>], notices: &mut Vec<String>) {
-    let faces = |part: &Part<'_>| part.emitter.as_ref().map_or(0, |emitter| emitter.faces.len());
-    if parts.iter().map(faces).sum::<usize>() <= MAX_EMITTING_FACES {
+    let lights = |part: &Part<'_>| part.emitter.as_ref().map_or(0, Emitter::lights);
+    if parts.iter().map(lights).sum::<usize>() <= MAX_LIGHTS {
         return;
     }
-    let power_of_face = |part: &Part<'_>| {
+    let power_of_light = |part: &Part<'_>| {
         let Some(Emitter { strength: Strength::Radiance(radiance), .. }) = part.emitter else { return 0.0 };
         let Mesh { vertices, triangles, .. } = &part.mesh;
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|i| part.placement.apply(vertices[i as usize]));
             (b - a).cross(c - a).length()
         };
-        radiance.element_sum() * triangles.iter().map(area).sum::<f64>() / faces(part) as f64
+        radiance.element_sum() * triangles.iter().map(area).sum::<f64>() / lights(part) as f64
     };
-    let mut order: Vec<usize> = (0..parts.len()).filter(|&i| faces(&parts[i]) > 0).collect();
-    order.sort_by(|&a, &b| power_of_face(&parts[b]).total_cmp(&power_of_face(&parts[a])));
-    let mut left = MAX_EMITTING_FACES;
+    let mut order: Vec<usize> = (0..parts.len()).filter(|&i| lights(&parts[i]) > 0).collect();
+    order.sort_by(|&a, &b| power_of_light(&parts[b]).total_cmp(&power_of_light(&parts[a])));
+    let mut left = MAX_LIGHTS;
     for index in order {
         let part = &mut parts[index];
-        let count = faces(part);
+        let count = lights(part);
         if count <= left {
             left -= count;
             continue;
         }
         part.emitter = None;
         notices.push(format!(
-            "object \"{}\": its {count} emitting faces stay dark: an import has at most {MAX_EMITTING_FACES}, those of most \
-             power first",
+            "object \"{}\": what emits of it stays dark: an import has at most {MAX_LIGHTS} lights, those of most power \
+             first",
             part.name
         ));
     }

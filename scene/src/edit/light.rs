@@ -70,7 +70,9 @@ fn edited(
         LightShape::Spot { .. } => (Some("spot"), SPOT),
         LightShape::Point { .. } => (Some("point"), POINT),
         LightShape::Directional { .. } => (Some("directional"), DIRECTIONAL),
-        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } => (Some("rectangle"), AREA),
+        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Mesh { .. } => {
+            (Some("rectangle"), AREA)
+        }
         LightShape::Sky { .. } => (Some("sky"), SKY),
     };
     let mut keys = Keys::read(values, shape, valid, field)?;
@@ -169,7 +171,7 @@ fn check(light: &Light, field: &Field<'_>) -> Result<(), SceneError> {
         LightShape::Directional { direction } => (&[], Some(*direction)),
         LightShape::Parallelogram { corner, edge_u, edge_v }
         | LightShape::Triangle { corner, edge_u, edge_v } => (&[*corner, *edge_u, *edge_v], None),
-        LightShape::Sky { .. } => (&[], None),
+        LightShape::Sky { .. } | LightShape::Mesh { .. } => (&[], None),
     };
     for position in positions {
         if !(position.is_finite() && f64::from(position.abs().max_element()) <= MAX_LENGTH_M) {

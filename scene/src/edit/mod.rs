@@ -7,7 +7,7 @@ mod place;
 mod values;
 
 use crate::{
-    bake,
+    bake::{self, Emitting, mesh_shape},
     build::area_light,
     bvh::Holes,
     config::{Document, Field, MAX_LENGTH_M},
@@ -177,10 +177,19 @@ impl SceneEdit {
         }
         scene.bounds = bake::sphere_around(&geometry.vertices);
         for light in &mut scene.lights {
-            let (Some(object), Some((face, strength))) = (light.object, light.face) else { continue };
+            let (Some(object), Some((emitting, strength))) = (light.object, light.face) else { continue };
             if moves.iter().any(|(id, _)| *id == object) {
                 let (mesh, pose) = (&scene.rest_meshes[object.0 as usize], &scene.poses[object.0 as usize]);
-                let shape = mesh.light_shape(face, pose, &scene.geometry.vertices);
+                let geometry = &scene.geometry;
+                let shape = match emitting {
+                    Emitting::Face(face) => mesh.light_shape(face, pose, &geometry.vertices),
+                    Emitting::Mesh => {
+                        let triangles = scene.objects[object.0 as usize].triangles.clone();
+                        let shape = mesh_shape(triangles.map(|t| geometry.triangle(t)));
+                        // Crushed to nothing it stays where it was, and its triangles are never hit.
+                        shape.unwrap_or_else(|| light.light.shape.clone())
+                    }
+                };
                 light.light = area_light(shape, strength);
                 if !light.enabled {
                     light.light.power = Vec3::ZERO;

@@ -98,6 +98,7 @@ fn light(ui: &mut Ui, name: &str, published: &Published, draft: &mut Draft, requ
         LightShape::Directional { .. } => "directional",
         LightShape::Parallelogram { .. } => "rectangle",
         LightShape::Triangle { .. } => "triangle",
+        LightShape::Mesh { .. } => "emitting mesh",
         LightShape::Sky { .. } => "sky",
     });
     if ui.checkbox(&mut draft.enabled, "on").changed() {

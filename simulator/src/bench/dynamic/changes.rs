@@ -57,9 +57,10 @@ fn moved_light(scene: &Scene) -> Option<(String, [Request; 2])> {
             let from = direction.as_dvec3();
             ("direction", from, from + DVec3::X * 0.1)
         }
-        LightShape::Parallelogram { .. } | LightShape::Triangle { .. } | LightShape::Sky { .. } => {
-            return None;
-        }
+        LightShape::Parallelogram { .. }
+        | LightShape::Triangle { .. }
+        | LightShape::Mesh { .. }
+        | LightShape::Sky { .. } => return None,
     };
     let set = |to: DVec3| Request::SetLight {
         name: light.name.clone(),
