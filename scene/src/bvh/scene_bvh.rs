@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use obvhs::aabb::Aabb;
+use rayon::prelude::*;
 
 use super::collapse::collapse;
 use super::dispatch::{Answer, Instructions, Query, detect};
@@ -38,14 +39,10 @@ impl SceneBvh {
     /// `vertices` are in metres, in world space. Triangles that cannot be hit are left out and counted in
     /// [`Self::ignored`]: corner numbers outside `vertices`, coordinates not finite or beyond
     /// [`super::MAX_COORDINATE`], zero area; so are numbers in `parts` beyond `triangles`.
+    ///
+    /// Parts are built at once in the current thread pool of rayon; the structure is the same for any number of threads.
     pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], parts: &[Range<u32>]) -> Self {
-        let parts = parts
-            .iter()
-            .map(|range| Part {
-                range: range.clone(),
-                bvh: Arc::new(Bvh::build(vertices, triangles, range.clone())),
-            })
-            .collect();
+        let parts = build_parts(parts, |range| Bvh::build(vertices, triangles, range));
         let mut scene = Self {
             parts,
             top: Vec::new(),
@@ -153,4 +150,21 @@ impl SceneBvh {
     pub fn instruction_set(&self) -> &'static str {
         self.instructions.name()
     }
+}
+
+/// The structure of each range, in their order; the largest are begun first, so that none keeps all others waiting at the end.
+fn build_parts(ranges: &[Range<u32>], build: impl Fn(Range<u32>) -> Bvh + Sync) -> Vec<Part> {
+    let mut order: Vec<usize> = (0..ranges.len()).collect();
+    order.sort_by_key(|&part| std::cmp::Reverse(ranges[part].len()));
+    // A bridge hands them out one by one; splitting the list would give one thread all the large ones.
+    let mut built: Vec<(usize, Part)> = order
+        .into_iter()
+        .par_bridge()
+        .map(|part| {
+            let range = ranges[part].clone();
+            (part, Part { range: range.clone(), bvh: Arc::new(build(range)) })
+        })
+        .collect();
+    built.sort_unstable_by_key(|(part, _)| *part);
+    built.into_iter().map(|(_, part)| part).collect()
 }
