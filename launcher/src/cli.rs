@@ -28,6 +28,11 @@ Examples:
   photonstream run room.toml --frames 20 --out film  pictures while the light settles
   photonstream check room.toml                       is the scene valid, and what will be modelled?
 
+Environment:
+  PHOTONSTREAM_SCENES  folder in which scene files' models are looked for
+  PHOTONSTREAM_CACHE   folder for references and for trees of large models, or \"off\"
+                       [default: $XDG_CACHE_HOME/photonstream or ~/.cache/photonstream]
+
 Exit codes:
   0    done
   1    failed: a file, shared memory, a picture

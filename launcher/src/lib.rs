@@ -14,6 +14,7 @@ mod device;
 mod error;
 mod exit;
 mod follow;
+mod kept;
 mod log;
 mod output;
 mod owned;
@@ -34,6 +35,7 @@ use std::process::ExitCode;
 pub fn main() -> ExitCode {
     let program = cli::Program::parse();
     log::start(&program.global);
+    kept::keep_trees();
     match commands::dispatch(program) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

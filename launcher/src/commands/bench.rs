@@ -1,10 +1,11 @@
 //! Turns a scene into figures of speed: the simulator, its parts, publishing and reading.
 
-use super::evaluate::{Adapter, user_cache};
+use super::evaluate::Adapter;
 use super::render::remove_channel;
 use crate::{
     cli::Global,
     error::LauncherError,
+    kept::user_cache,
     output,
     progress::{Share, Spinner},
     signals::Listener,

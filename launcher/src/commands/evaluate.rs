@@ -2,7 +2,9 @@
 
 #[cfg(feature = "wgpu")]
 use crate::device::GpuDevice;
-use crate::{cli::Global, error::LauncherError, output, progress::Share, signals::Listener};
+use crate::{
+    cli::Global, error::LauncherError, kept::user_cache, output, progress::Share, signals::Listener,
+};
 use photonstream_evaluation::{Observer, Options, device::Offered, evaluate, plan::Effort};
 use photonstream_renderer::cli::Size;
 use serde::Serialize;
@@ -156,13 +158,6 @@ impl Adapter {
     ) -> Result<T, LauncherError> {
         measure(Err("this build has no GPU renderer: its feature wgpu is off".into()))
     }
-}
-
-/// `$XDG_CACHE_HOME/photonstream`, else `~/.cache/photonstream`.
-pub(crate) fn user_cache() -> Option<PathBuf> {
-    let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let base = folder("XDG_CACHE_HOME").or_else(|| folder("HOME").map(|home| home.join(".cache")))?;
-    base.is_absolute().then(|| base.join("photonstream"))
 }
 
 fn text(report: &Report) -> String {

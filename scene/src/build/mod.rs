@@ -15,7 +15,7 @@ mod steady_state;
 use crate::{
     animation::{self, Rig},
     bake::{self, Baked, BakedEmitter, Part, Strength},
-    bvh::{Holes, SceneBvh},
+    bvh::{Holes, SceneBvh, TreeCache},
     config::{Document, Field, LightConfig, SceneConfig},
     error::SceneError,
     features::Features,
@@ -115,7 +115,8 @@ impl SceneConfig {
         let Baked { geometry, objects, rest_meshes, poses, bounds, .. } = baked;
 
         let ranges: Vec<_> = objects.iter().map(|o| o.triangles.clone()).collect();
-        let mut bvh = SceneBvh::build(&geometry.vertices, &geometry.triangles, &ranges);
+        let cache = TreeCache::of_this_process();
+        let mut bvh = SceneBvh::build_cached(&geometry.vertices, &geometry.triangles, &ranges, cache);
         bvh.set_holes(Holes::find(&geometry, &objects, &materials));
         let sky = lights.iter().position(|l| l.light.shape.sky().is_some()).map(|i| LightId(i as u32));
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);

@@ -26,7 +26,7 @@
 //! Eight-wide nodes of 256 bytes (lower and upper bounds of the children by axis in `f32`, references) over leaves of
 //! one packet, up to eight triangles as structure of arrays with their numbers, 320 bytes. Triangles are stored by
 //! position: one hit reads no index or vertex buffer. Sponza's packets hold 4.6 triangles on average: **about 80 bytes a
-//! triangle** with nodes (at best 45, at worst 320 for single triangles). Building takes about 250 bytes a triangle
+//! triangle** with nodes (at best 45, at worst 320 for single triangles), in files, too. Building takes about 250 bytes a triangle
 //! for the while. Lists of half a megabyte and more fill whole large pages (2 MB each). A part is one such tree; several
 //! parts hang under a small tree of the same nodes; all is world space, so nothing is transformed on the way. The stack is
 //! a fixed array of each thread; building bounds the depth
@@ -42,6 +42,7 @@
 //!   Möller and Trumbore. Here three or more children go through a sorting network without a branch, there are no
 //!   spatial splits (a piece's box would not enclose its triangle, and the argument above would fall).
 
+mod cache;
 mod collapse;
 mod dispatch;
 mod error;
@@ -67,6 +68,7 @@ mod tests;
 
 use glam::Vec3;
 
+pub use cache::TreeCache;
 pub use error::BvhError;
 pub(crate) use holes::Holes;
 pub use part::Bvh;

@@ -24,19 +24,49 @@ pub(super) enum Pages<T> {
 impl<T: Pod> From<Vec<T>> for Pages<T> {
     fn from(list: Vec<T>) -> Self {
         let bytes: &[u8] = bytemuck::cast_slice(&list);
-        if bytes.len() < MOVED_FROM {
-            return Self::Short(list);
-        }
-        // Without memory to be mapped the list stays where it is.
-        let Ok(mut memory) = MmapMut::map_anon(bytes.len().next_multiple_of(LARGE_PAGE)) else {
+        let Some(mut memory) = mapped(bytes.len()) else {
             return Self::Short(list);
         };
-        // A wish: what the system makes of it changes nothing but speed.
-        #[cfg(target_os = "linux")]
-        let _ = memory.advise(memmap2::Advice::HugePage);
         memory[..bytes.len()].copy_from_slice(bytes);
         Self::Long { memory, len: list.len() }
     }
+}
+
+impl<T: Pod> Pages<T> {
+    /// A list of `len` items of zeros, after `fill` wrote it.
+    ///
+    /// # Errors
+    /// Those of `fill`.
+    pub(super) fn filled<E>(len: usize, fill: impl FnOnce(&mut [T]) -> Result<(), E>) -> Result<Self, E> {
+        let bytes = len * size_of::<T>();
+        if let Some(mut memory) = mapped(bytes) {
+            fill(bytemuck::cast_slice_mut(&mut memory[..bytes]))?;
+            return Ok(Self::Long { memory, len });
+        }
+        let mut list = vec![T::zeroed(); len];
+        fill(&mut list)?;
+        Ok(Self::Short(list))
+    }
+
+    /// The list, to be changed in place.
+    pub(super) fn items_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::Short(list) => list,
+            Self::Long { memory, len } => bytemuck::cast_slice_mut(&mut memory[..*len * size_of::<T>()]),
+        }
+    }
+}
+
+/// Memory for a long list, as large pages; `None` for a short one, and where the system gives none.
+fn mapped(bytes: usize) -> Option<MmapMut> {
+    if bytes < MOVED_FROM {
+        return None;
+    }
+    let memory = MmapMut::map_anon(bytes.next_multiple_of(LARGE_PAGE)).ok()?;
+    // A wish: what the system makes of it changes nothing but speed.
+    #[cfg(target_os = "linux")]
+    let _ = memory.advise(memmap2::Advice::HugePage);
+    Some(memory)
 }
 
 impl<T: Pod> Deref for Pages<T> {
@@ -78,6 +108,16 @@ mod tests {
             assert_eq!(matches!(pages, Pages::Short(_)), len * 4 < MOVED_FROM, "{len}");
             assert_eq!(*pages, *list, "{len}");
             assert_eq!(*pages.clone(), *list, "{len}");
+            let fill = |items: &mut [u32]| -> Result<(), ()> {
+                items.copy_from_slice(&list);
+                Ok(())
+            };
+            let mut filled = Pages::filled(len, fill).unwrap();
+            assert_eq!(matches!(filled, Pages::Short(_)), len * 4 < MOVED_FROM, "{len}");
+            assert_eq!(*filled, *list, "{len}");
+            filled.items_mut().reverse();
+            assert!(filled.iter().eq(list.iter().rev()), "{len}");
+            assert_eq!(Pages::<u32>::filled(len, |_| Err(5)).unwrap_err(), 5, "{len}");
         }
     }
 }

@@ -29,6 +29,15 @@ const CLUSTERED_UP_TO: usize = 300_000;
 /// Clustering is left out if more boxes than this are the same: it would join one pair of them a pass.
 const LARGEST_STACK: usize = 64;
 
+/// What decides how large parts are built.
+pub(super) const PARAMETERS: [u64; 5] = [
+    REINSERTED.to_bits() as u64,
+    REINSERTED_IN_LARGE.to_bits() as u64,
+    STACKED_PART as u64,
+    CLUSTERED_UP_TO as u64,
+    LARGEST_STACK as u64,
+];
+
 /// The ray-tracing structure of one part: world-space triangles under eight-wide nodes.
 #[derive(Clone, Debug)]
 pub struct Bvh {

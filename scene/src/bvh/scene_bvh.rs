@@ -7,6 +7,7 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
+use super::cache::TreeCache;
 use super::collapse::collapse;
 use super::dispatch::{Answer, Instructions, Query, detect};
 use super::node::{NONE, Node};
@@ -42,7 +43,21 @@ impl SceneBvh {
     ///
     /// Parts are built at once in the current thread pool of rayon; the structure is the same for any number of threads.
     pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], parts: &[Range<u32>]) -> Self {
-        let parts = build_parts(parts, |range| Bvh::build(vertices, triangles, range));
+        Self::of_parts(build_parts(parts, |range| Bvh::build(vertices, triangles, range)))
+    }
+
+    /// As [`Self::build`], with the trees of large parts from `cache` where it has them, and kept there where not.
+    pub(crate) fn build_cached(
+        vertices: &[Vec3],
+        triangles: &[[u32; 3]],
+        parts: &[Range<u32>],
+        cache: Option<&TreeCache>,
+    ) -> Self {
+        let Some(cache) = cache else { return Self::build(vertices, triangles, parts) };
+        Self::of_parts(build_parts(parts, |range| cache.tree(vertices, triangles, range)))
+    }
+
+    fn of_parts(parts: Vec<Part>) -> Self {
         let mut scene = Self {
             parts,
             top: Vec::new(),

@@ -36,7 +36,7 @@ impl SceneBvh {
     }
 }
 
-fn check_part(number: usize, bvh: &Bvh, range: &Range<u32>) -> Result<(), BvhError> {
+pub(super) fn check_part(number: usize, bvh: &Bvh, range: &Range<u32>) -> Result<(), BvhError> {
     let tree = format!("part {number}");
     let mut seen = vec![false; range.len()];
     let mut packets = vec![false; bvh.packets.len()];

@@ -77,6 +77,7 @@ impl Ground {
             .args(arguments)
             .current_dir(self.path(""))
             .env("PHOTONSTREAM_RUNTIME_DIR", self.runtime())
+            .env("PHOTONSTREAM_CACHE", "off")
             .env_remove("RUST_LOG")
             // No test opens a window on the display of whoever runs it.
             .env_remove("DISPLAY")

@@ -6,5 +6,5 @@ mod brute_force;
 mod degenerate;
 mod parts;
 mod refit;
-mod shapes;
+pub(super) mod shapes;
 mod watertight;

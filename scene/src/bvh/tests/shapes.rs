@@ -7,13 +7,13 @@ use glam::{Vec3, vec3};
 use crate::bvh::SceneBvh;
 use crate::bvh::dispatch::all;
 
-pub(super) type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
+pub(in crate::bvh) type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// SplitMix64.
-pub(super) struct Random(pub(super) u64);
+pub(in crate::bvh) struct Random(pub(in crate::bvh) u64);
 
 impl Random {
-    pub(super) fn bits(&mut self) -> u64 {
+    pub(in crate::bvh) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -21,22 +21,22 @@ impl Random {
     }
 
     /// In [0, 1).
-    pub(super) fn unit(&mut self) -> f32 {
+    pub(in crate::bvh) fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / 16_777_216.0
     }
 
-    pub(super) fn below(&mut self, end: usize) -> usize {
+    pub(in crate::bvh) fn below(&mut self, end: usize) -> usize {
         (self.bits() % end as u64) as usize
     }
 
     /// In the cube [−1, 1)³.
-    pub(super) fn in_cube(&mut self) -> Vec3 {
+    pub(in crate::bvh) fn in_cube(&mut self) -> Vec3 {
         vec3(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 }
 
 /// `count` triangles of up to `size` scattered in the cube [−1, 1]³; every eighth repeats an earlier one.
-pub(super) fn soup(random: &mut Random, count: usize, size: f32) -> Mesh {
+pub(in crate::bvh) fn soup(random: &mut Random, count: usize, size: f32) -> Mesh {
     let mut vertices: Vec<Vec3> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for i in 0..count {
@@ -53,7 +53,7 @@ pub(super) fn soup(random: &mut Random, count: usize, size: f32) -> Mesh {
 }
 
 /// The surface of [−1, 1]³, `cells`² quads a side, outer vertices shared by position.
-pub(super) fn cube(cells: u32) -> Mesh {
+pub(in crate::bvh) fn cube(cells: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
@@ -80,7 +80,7 @@ pub(super) fn cube(cells: u32) -> Mesh {
 }
 
 /// The unit sphere in `rings` × `sectors` quads; the poles' zero-area triangles included.
-pub(super) fn sphere(rings: u32, sectors: u32) -> Mesh {
+pub(in crate::bvh) fn sphere(rings: u32, sectors: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for ring in 0..=rings {
         // Exactly one position at each pole.
@@ -105,21 +105,21 @@ pub(super) fn sphere(rings: u32, sectors: u32) -> Mesh {
     mesh
 }
 
-pub(super) fn moved((vertices, triangles): &Mesh, scale: f32, offset: Vec3) -> Mesh {
+pub(in crate::bvh) fn moved((vertices, triangles): &Mesh, scale: f32, offset: Vec3) -> Mesh {
     (vertices.iter().map(|v| *v * scale + offset).collect(), triangles.clone())
 }
 
-pub(super) fn everything(mesh: &Mesh) -> [Range<u32>; 1] {
+pub(in crate::bvh) fn everything(mesh: &Mesh) -> [Range<u32>; 1] {
     [0..mesh.1.len() as u32]
 }
 
-pub(super) fn build(mesh: &Mesh) -> SceneBvh {
+pub(in crate::bvh) fn build(mesh: &Mesh) -> SceneBvh {
     let scene = SceneBvh::build(&mesh.0, &mesh.1, &everything(mesh));
     scene.validate().unwrap();
     scene
 }
 
 /// The same structure walked with every instruction set of this machine.
-pub(super) fn on_every_path(scene: &SceneBvh) -> Vec<SceneBvh> {
+pub(in crate::bvh) fn on_every_path(scene: &SceneBvh) -> Vec<SceneBvh> {
     all().into_iter().map(|instructions| SceneBvh { instructions, ..scene.clone() }).collect()
 }
