@@ -9,7 +9,7 @@ use crate::{
 use photonstream_protocol::{
     AccessMode, ChannelName, Liveness, ProtocolError, Reading, Subscriber, VslFrame,
 };
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between two looks at the channel.
 const LOOK: Duration = Duration::from_millis(4);
@@ -46,11 +46,14 @@ pub(crate) fn converged_frame(
     let light = Light::start();
     let mut subscriber = None;
     loop {
-        if let Some(frame) = poll(&mut subscriber, channel)? {
-            light.show(frame);
-            if frame.statistics.converged == 1 {
-                return Ok(frame.clone());
+        match poll(&mut subscriber, channel)? {
+            Some(frame) => {
+                light.show(frame);
+                if frame.statistics.converged == 1 {
+                    return Ok(frame.clone());
+                }
             }
+            None => light.prepare(),
         }
         if supervisor.is_over(Kind::Simulator) {
             let what = "its light had converged";
@@ -78,17 +81,28 @@ pub(crate) fn poll<'a>(
 }
 
 /// The progress of the light.
-pub(crate) struct Light(Share);
+pub(crate) struct Light {
+    bar: Share,
+    begun: Instant,
+}
 
 impl Light {
     pub(crate) fn start() -> Self {
-        Self(Share::start("light"))
+        Self { bar: Share::start("light"), begun: Instant::now() }
+    }
+
+    /// Before there is any: the scene is read, and lights are placed.
+    pub(crate) fn prepare(&self) {
+        self.bar.say(format!(
+            "reading the scene and placing lights, {:.0} s",
+            self.begun.elapsed().as_secs_f64()
+        ));
     }
 
     pub(crate) fn show(&self, frame: &VslFrame) {
         let statistics = &frame.statistics;
-        self.0.set(statistics.pool_valid as f64 / statistics.pool_paths.max(1) as f64);
-        self.0.say(format!(
+        self.bar.set(statistics.pool_valid as f64 / statistics.pool_paths.max(1) as f64);
+        self.bar.say(format!(
             "{} paths, {} VSLs, {}rays/s",
             grouped(statistics.paths_total),
             grouped(frame.vsls.len() as u64),

@@ -10,7 +10,11 @@ use photonstream_protocol::ChannelName;
 use photonstream_scene::{Sampling, Scene, SceneConfig, SceneError, StreamingSettings};
 use photonstream_shading::distance_map::EDGES;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use std::{path::PathBuf, sync::Arc, time::Instant};
+use std::{
+    path::PathBuf,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// Arguments of `photonstream simulate` and `photonstream-simulator`.
 #[derive(Clone, Debug, clap::Args)]
@@ -140,6 +144,9 @@ impl Overrides {
     }
 }
 
+/// Loading for so long is told of, and what comes next.
+const LONG: Duration = Duration::from_secs(1);
+
 /// Simulates until a signal (Ctrl-C, SIGTERM, SIGHUP) or a client of the control socket ends it.
 ///
 /// # Errors
@@ -156,6 +163,14 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         tracing::warn!("{}: {notice}", scene.name);
     }
     let loaded = begun.elapsed();
+    if loaded >= LONG {
+        let triangles = scene.geometry.triangles.len();
+        tracing::info!(
+            "{}: read {triangles} triangles in {:.1} s; placing lights",
+            scene.name,
+            loaded.as_secs_f64()
+        );
+    }
     let name = scene.name.clone();
     let Some(simulation) = place(scene, &stop)? else {
         return Ok(Summary::of_nothing(name, begun.elapsed()));

@@ -97,6 +97,8 @@ struct Report {
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     Format::of(&args.out)?;
     let stop = stop(args)?;
+    // Loading has threads of its own, and is interrupted in words, too.
+    let cancelled = Listener::flag_only()?;
     let scene = SceneConfig::from_file(&args.config)?.build()?;
     let mut options = ReferenceOptions::from_settings(&scene.render, stop);
     if let Some(size) = args.size {
@@ -106,7 +108,6 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     options.seed = args.seed;
     options.pixel_filter = args.filter.into();
     options.threads = args.threads;
-    let cancelled = Listener::flag_only()?;
     let bar = Share::start("reference");
     let progress = |share: f64| bar.set(share);
     let watch = Watch { progress: Some(&progress), cancelled: Some(&cancelled) };

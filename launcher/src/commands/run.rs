@@ -228,6 +228,8 @@ fn watch(
         if let Ok(Some(frame)) = follow::poll(&mut subscriber, channel) {
             light.show(frame);
             renderers.drain(..).try_for_each(|role| supervisor.start(role))?;
+        } else if !renderers.is_empty() {
+            light.prepare();
         }
     }
     Ok(())
