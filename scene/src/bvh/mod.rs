@@ -25,7 +25,7 @@
 //! # Layout
 //! Eight-wide nodes of 256 bytes (lower and upper bounds of the children by axis in `f32`, references) over leaves of
 //! one packet, up to eight triangles as structure of arrays with their numbers, 320 bytes. Triangles are stored by
-//! position: one hit reads no index or vertex buffer. Sponza's packets hold 4.6 triangles on average: **about 80 bytes a
+//! position: one hit reads no index or vertex buffer. Sponza's packets hold 4.4 triangles on average: **about 80 bytes a
 //! triangle** with nodes (at best 45, at worst 320 for single triangles), in files, too. Building takes about 250 bytes a triangle
 //! for the while. Lists of half a megabyte and more fill whole large pages (2 MB each). A part is one such tree; several
 //! parts hang under a small tree of the same nodes; all is world space, so nothing is transformed on the way. The stack is
