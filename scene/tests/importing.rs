@@ -279,6 +279,21 @@ fn materials_are_replaced_by_name() {
     }
 }
 
+/// Groups are renamed too, and a lamp shines from behind.
+#[test]
+fn single_objects_are_otherwise() {
+    let files = Files::new(OBJ, MTL);
+    let scene = files.scene(
+        "",
+        ", parts = { ceiling = { rename = \"a\", sides = \"back\" }, floor = { sides = \"both\" } }",
+    );
+    assert_eq!(names(&scene), ["it/a", "it/floor/white", "it/odd/lamp", "it/odd/white"]);
+    assert_eq!(scene.lights[scene.light("it/a").unwrap().0 as usize].light.shape.emitter_normal(), Vec3::Y);
+    assert_eq!(scene.objects.iter().filter(|o| o.sides == Sides::Both).count(), 1);
+    let error = files.build("", ", parts = { odd = { rename = \"a\" } }").unwrap_err().to_string();
+    assert!(error.contains("2 objects called \"odd\": \"it/odd/lamp\", \"it/odd/white\""), "{error}");
+}
+
 /// Clear panes are not there for light, nor for the eye.
 #[test]
 fn light_passes_what_transmits() {

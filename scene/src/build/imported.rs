@@ -5,28 +5,20 @@ use super::{
     imported_cameras::PlacedCamera,
     imported_lights::{self, Overrides},
     imported_motion::{Motion, resolve_choice},
+    imported_names::{Tables, full, named},
+    imported_parts::{Source, limit_emitters, part, surface},
     materials::Materials,
 };
 use crate::{
-    bake::{Emitter, EmitterFace, Part, Strength},
-    config::{AnimationChoice, Field, GltfConfig, LightOverride, ObjConfig, ObjectConfig},
-    error::{SceneError, nearest},
-    import::{AssetRoots, Frame, Group, Import, ImportedMaterial, LeftOut, Terms, load_gltf, load_obj},
+    config::{AnimationChoice, Field, GltfConfig, LightOverride, ObjConfig, ObjectConfig, PartOverride},
+    error::SceneError,
+    import::{AssetRoots, Frame, load_gltf, load_obj},
     placement::Placement,
-    primitives::Mesh,
-    scene::Sides,
 };
-use glam::DVec3;
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     path::{Path, PathBuf},
 };
-
-/// Albedo of imported faces without a material.
-const DEFAULT_ALBEDO: f64 = 0.5;
-
-/// Most emitting lights of an import.
-const MAX_LIGHTS: usize = 1024;
 
 /// What importing one object needs and fills.
 pub(super) struct Context<'c, 'a> {
@@ -43,6 +35,7 @@ struct Table<'c, 'a> {
     exclude: &'c [String],
     transmit: &'c [String],
     materials: Option<&'c BTreeMap<String, String>>,
+    parts: Option<&'c BTreeMap<String, PartOverride>>,
     frame: Frame,
     smooth: bool,
     field: Field<'a>,
@@ -58,7 +51,9 @@ struct Stage<'c> {
 }
 
 fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Table<'c, 'a>, SceneError> {
-    if let Some(ObjConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials }) = &mut object.obj {
+    if let Some(ObjConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, parts }) =
+        &mut object.obj
+    {
         let field = field.key("obj");
         let frame = Frame::resolve(up_axis, unit_m, &field)?;
         let (exclude, transmit) = (exclude.get_or_insert_default(), transmit.get_or_insert_default());
@@ -67,6 +62,7 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
             exclude,
             transmit,
             materials: materials.as_ref(),
+            parts: parts.as_ref(),
             frame,
             smooth: *smooth.get_or_insert(true),
             field,
@@ -74,7 +70,7 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
         });
     }
     let gltf = object.gltf.as_mut().expect("invariant: called for imports of several objects only");
-    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, lights, .. } = gltf;
+    let GltfConfig { path, up_axis, unit_m, smooth, exclude, transmit, materials, parts, lights, .. } = gltf;
     let (animation, held_s) = (&mut gltf.animation, gltf.animation_time_s);
     let field = field.key("gltf");
     let frame = Frame::resolve(up_axis, unit_m, &field)?;
@@ -82,10 +78,10 @@ fn table<'c, 'a>(object: &'c mut ObjectConfig, field: &Field<'a>) -> Result<Tabl
     if let Some(time) = held_s {
         field.key("animation_time_s").number(time, "a time in s", |_| true)?;
     }
-    let materials = materials.as_ref();
+    let (materials, parts) = (materials.as_ref(), parts.as_ref());
     let smooth = *smooth.get_or_insert(true);
     let stage = Some(Stage { animation, held_s, lights: lights.as_ref() });
-    Ok(Table { path, exclude, transmit, materials, frame, smooth, field, stage })
+    Ok(Table { path, exclude, transmit, materials, parts, frame, smooth, field, stage })
 }
 
 /// The file of an asset, and its absolute path as text.
@@ -117,7 +113,7 @@ pub(super) fn read(
     context: &mut Context<'_, '_>,
 ) -> Result<(), SceneError> {
     let (sides, overriding) = (object.sides, object.material.clone());
-    let Table { path, exclude, transmit, materials, frame, smooth, field, stage } =
+    let Table { path, exclude, transmit, materials, parts, frame, smooth, field, stage } =
         table(object, context.field)?;
     let path_field = field.key("path");
     let (file, absolute) = find(path, &path_field, context.roots)?;
@@ -135,10 +131,11 @@ pub(super) fn read(
         }
         context.notices.push(format!("object \"{name}\": {problem}; its `material` is used instead"));
     }
-    let mut excluded = named(&import, exclude, &field.key("exclude"))?;
+    let mut excluded = named(&import, &import.nodes, exclude, &field.key("exclude"))?;
     // What lets all light pass straight through is not there for it.
-    excluded.extend(named(&import, transmit, &field.key("transmit"))?);
-    let replaced = replaced(&import, materials, &field.key("materials"), context.materials)?;
+    excluded.extend(named(&import, &BTreeMap::new(), transmit, &field.key("transmit"))?);
+    let tables = Tables { materials, parts, field: field.clone() };
+    let mut objects = tables.read(name, &import, &excluded, context.materials)?;
     context.inputs.files.extend(import.files.iter().cloned());
     context.inputs.contents.insert(name.to_owned(), (absolute, import.content));
     let of_materials = if overriding.is_none() { import.material_notices.as_slice() } else { &[] };
@@ -153,34 +150,33 @@ pub(super) fn read(
         motion = import.played.map(|played| Motion::new(played, frame, placement, held_s, note));
         changed_lights = lights;
     }
-    let mut parts = Vec::new();
-    for ((group, material), mut content) in import.groups {
-        if excluded.contains(&format!("{group}/{material}")) {
-            continue;
-        }
-        let imported = import.materials.get(&material);
-        let overriding = replaced.get(&format!("{group}/{material}")).or(overriding.as_ref());
-        let surface =
-            surface(name, &material, imported, (import.terms, overriding.is_some()), context.notices)
-                .map_err(|problem| asset_error(file.clone(), problem, "repair the material"))?;
-        let source = Source {
-            name,
-            group: &group,
-            material: &material,
-            override_material: overriding.map(String::as_str),
+    let mut made = Vec::new();
+    for (pair, mut content) in import.groups {
+        let Some(otherwise) = objects.remove(&pair) else { continue };
+        let (group, material) = &pair;
+        let imported = import.materials.get(material);
+        let overriding = otherwise.material.as_ref().or(overriding.as_ref());
+        let terms = (import.terms, overriding.is_some(), &otherwise);
+        let surface = surface(name, material, imported, terms, context.notices)
+            .map_err(|problem| asset_error(file.clone(), problem, "repair the material"))?;
+        let object = match &otherwise.rename {
+            Some(new) => format!("{name}/{new}"),
+            None => full(name, &pair),
         };
         if !smooth {
             content.mesh.normals.clear();
         }
-        let object = source.object();
-        let moved = motion.as_mut().and_then(|motion| motion.place(&group, &object, &mut content));
-        parts.push(part(source, content, surface, (sides, placement, moved), context));
+        let moved = motion.as_mut().and_then(|motion| motion.place(group, &object, &mut content));
+        let override_material = overriding.map(String::as_str);
+        let source = Source { import: name, object, material, override_material };
+        let sides = otherwise.sides.or(sides);
+        made.push(part(source, content, surface, (sides, placement, moved), context));
     }
-    if parts.is_empty() {
+    if made.is_empty() {
         return Err(asset_error(file, "no faces are left of it".into(), "check the file and `exclude`"));
     }
-    limit_emitters(&mut parts, context.notices);
-    context.inputs.parts.extend(parts.into_iter().map(|part| (part.name.clone(), part)));
+    limit_emitters(&mut made, context.notices);
+    context.inputs.parts.extend(made.into_iter().map(|part| (part.name.clone(), part)));
     let overrides = Overrides::new(changed_lights, &import.lights, field.key("lights"))?;
     for light in import.lights {
         imported_lights::add(name, light, (placement, motion.as_mut()), &overrides, context.inputs)?;
@@ -194,204 +190,4 @@ pub(super) fn read(
         motion.finish(name, context.inputs);
     }
     Ok(())
-}
-
-/// Leaves an import the emitters of most power for each light, up to [`MAX_LIGHTS`] lights; the others stay dark.
-fn limit_emitters(parts: &mut [Part<'_>], notices: &mut Vec<String>) {
-    let lights = |part: &Part<'_>| part.emitter.as_ref().map_or(0, Emitter::lights);
-    if parts.iter().map(lights).sum::<usize>() <= MAX_LIGHTS {
-        return;
-    }
-    let power_of_light = |part: &Part<'_>| {
-        let Some(Emitter { strength: Strength::Radiance(radiance), .. }) = part.emitter else { return 0.0 };
-        let Mesh { vertices, triangles, .. } = &part.mesh;
-        let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|i| part.placement.apply(vertices[i as usize]));
-            (b - a).cross(c - a).length()
-        };
-        radiance.element_sum() * triangles.iter().map(area).sum::<f64>() / lights(part) as f64
-    };
-    let mut order: Vec<usize> = (0..parts.len()).filter(|&i| lights(&parts[i]) > 0).collect();
-    order.sort_by(|&a, &b| power_of_light(&parts[b]).total_cmp(&power_of_light(&parts[a])));
-    let mut left = MAX_LIGHTS;
-    for index in order {
-        let part = &mut parts[index];
-        let count = lights(part);
-        if count <= left {
-            left -= count;
-            continue;
-        }
-        part.emitter = None;
-        notices.push(format!(
-            "object \"{}\": what emits of it stays dark: an import has at most {MAX_LIGHTS} lights, those of most power \
-             first",
-            part.name
-        ));
-    }
-}
-
-/// The names that a part of an import is made from.
-struct Source<'s> {
-    name: &'s str,
-    group: &'s str,
-    material: &'s str,
-    override_material: Option<&'s str>,
-}
-
-impl Source<'_> {
-    /// The name of the object.
-    fn object(&self) -> String {
-        format!("{}/{}/{}", self.name, self.group, self.material)
-    }
-}
-
-fn part<'a>(
-    source: Source<'_>,
-    content: Group,
-    surface: ImportedMaterial,
-    (sides, placement, moved): (Option<Sides>, Placement, Option<Placement>),
-    context: &mut Context<'_, 'a>,
-) -> Part<'a> {
-    let part_name = source.object();
-    let Source { name, material, override_material, .. } = source;
-    let Group { mut mesh, mut faces } = content;
-    let sides = sides.unwrap_or(if surface.two_sided { Sides::Both } else { Sides::Front });
-    let mut part_sides = sides;
-    let emits = surface.radiance != DVec3::ZERO;
-    if emits && sides == Sides::Back {
-        // Emitters shine from their front: the file's winding is turned to bring it where the reflecting side is.
-        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        faces.iter_mut().for_each(|face| match face {
-            EmitterFace::Parallelogram(corners) | EmitterFace::Triangle(corners) => corners.swap(1, 2),
-        });
-        part_sides = Sides::Front;
-    }
-    if emits && sides == Sides::Both {
-        context.notices.push(format!("object \"{part_name}\": emits from its front only"));
-    }
-    let mut has_texture = false;
-    let material = match override_material {
-        Some(material) => material.to_owned(),
-        None => {
-            let material = format!("{name}/{material}");
-            has_texture = surface.texture.is_some();
-            context.materials.add(material.clone(), surface.albedo, surface.texture);
-            material
-        }
-    };
-    if !has_texture {
-        mesh.uvs.clear();
-    }
-    Part {
-        name: part_name,
-        field: context.field.clone(),
-        material,
-        sides: part_sides,
-        mesh,
-        placement: moved.unwrap_or(placement),
-        is_imported: true,
-        moves: moved.is_some(),
-        emitter: emits.then_some(Emitter { strength: Strength::Radiance(surface.radiance), faces }),
-    }
-}
-
-/// The validated surface of an imported material; what it reflects does not matter if it is `overridden`.
-fn surface(
-    object: &str,
-    name: &str,
-    material: Option<&ImportedMaterial>,
-    (terms, overridden): (Terms, bool),
-    notices: &mut Vec<String>,
-) -> Result<ImportedMaterial, String> {
-    let mut note = |what: String| {
-        let notice = format!("object \"{object}\": material \"{name}\": {what}");
-        if !notices.contains(&notice) {
-            notices.push(notice);
-        }
-    };
-    let Some(material) = material else {
-        if !overridden {
-            note(format!("faces without a known material have albedo {DEFAULT_ALBEDO}"));
-        }
-        return Ok(ImportedMaterial {
-            albedo: DVec3::splat(DEFAULT_ALBEDO),
-            texture: None,
-            radiance: DVec3::ZERO,
-            two_sided: false,
-        });
-    };
-    let mut surface = material.clone();
-    if !surface.albedo.is_finite() || surface.albedo.min_element() < 0.0 {
-        return Err(format!(
-            "material \"{name}\": found {} {}, expected numbers from 0 to 1",
-            terms.albedo, surface.albedo
-        ));
-    }
-    let radiance_max = surface.radiance.max_element();
-    if !surface.radiance.is_finite() || surface.radiance.min_element() < 0.0 || radiance_max > 1e12 {
-        return Err(format!(
-            "material \"{name}\": found {} {}, expected numbers from 0 to 1e12",
-            terms.radiance, surface.radiance
-        ));
-    }
-    if surface.albedo.max_element() > 1.0 {
-        note(format!("{} {} is brought down to at most 1", terms.albedo, surface.albedo));
-        surface.albedo = surface.albedo.min(DVec3::ONE);
-    }
-    Ok(surface)
-}
-
-/// The material of the scene file for each `group/material` pair that has one in the file's place: that of the pair, else
-/// of the material, else of the group.
-fn replaced(
-    import: &Import,
-    materials: Option<&BTreeMap<String, String>>,
-    field: &Field<'_>,
-    known: &Materials,
-) -> Result<BTreeMap<String, String>, SceneError> {
-    let mut replaced = BTreeMap::new();
-    let Some(materials) = materials else { return Ok(replaced) };
-    for (name, material) in materials {
-        known.check(material, &field.key(name))?;
-        named(import, std::slice::from_ref(name), field)?;
-    }
-    for (group, material) in import.groups.keys() {
-        let pair = format!("{group}/{material}");
-        let own = [&pair, material, group].into_iter().find_map(|name| materials.get(name));
-        replaced.extend(own.map(|own| (pair, own.clone())));
-    }
-    Ok(replaced)
-}
-
-/// The `group/material` pairs that `names` name.
-fn named(import: &Import, names: &[String], field: &Field<'_>) -> Result<BTreeSet<String>, SceneError> {
-    let mut excluded = BTreeSet::new();
-    for name in names {
-        let mut known: BTreeSet<String> = import.nodes.keys().cloned().collect();
-        let mut matched = import.nodes.get(name) == Some(&LeftOut(true));
-        for (group, material) in import.groups.keys() {
-            let pair = format!("{group}/{material}");
-            if name == group || name == material || *name == pair {
-                matched = true;
-                excluded.insert(pair);
-            } else {
-                known.extend([group.clone(), material.clone()]);
-            }
-        }
-        if !matched {
-            return Err(SceneError::UnknownName {
-                place: field.place(),
-                kind: if import.nodes.is_empty() {
-                    "group or material of the file"
-                } else {
-                    "node or material of the file"
-                },
-                found: name.clone(),
-                nearest: nearest(name, known.iter().map(String::as_str)),
-                known: known.into_iter().collect(),
-            });
-        }
-    }
-    Ok(excluded)
 }

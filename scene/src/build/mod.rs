@@ -5,6 +5,8 @@ mod imported;
 mod imported_cameras;
 mod imported_lights;
 mod imported_motion;
+mod imported_names;
+mod imported_parts;
 pub(crate) mod lights;
 mod materials;
 mod objects;

@@ -1,6 +1,7 @@
 //! Gathers what a scene file says of the files that objects are imported from.
 
 use super::{ObjectConfig, OneOrThree, values};
+use crate::scene::Sides;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::BTreeMap;
 
@@ -34,6 +35,8 @@ pub struct ObjConfig {
     pub transmit: Option<Vec<String>>,
     /// Materials of the scene file in the place of the file's, by group, material or `group/material` pair.
     pub materials: Option<BTreeMap<String, String>>,
+    /// What is otherwise than in the file, of objects by group, material or `group/material` pair.
+    pub parts: Option<BTreeMap<String, PartOverride>>,
 }
 
 /// `ply`: the faces of a PLY file as one object.
@@ -72,12 +75,29 @@ pub struct GltfConfig {
     pub transmit: Option<Vec<String>>,
     /// Materials of the scene file in the place of the file's, by node, material or `node/material` pair.
     pub materials: Option<BTreeMap<String, String>>,
+    /// What is otherwise than in the file, of objects by node, material or `node/material` pair.
+    pub parts: Option<BTreeMap<String, PartOverride>>,
     /// What is otherwise than in the file, of the lights of nodes by the name of the node.
     pub lights: Option<BTreeMap<String, LightOverride>>,
     /// The animation that plays, again and again; default the file's first.
     pub animation: Option<AnimationChoice>,
     /// Moment at which the animation is held, s; default: it plays.
     pub animation_time_s: Option<f64>,
+}
+
+/// What of an object of a file is otherwise than there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartOverride {
+    /// What takes the place of `group/material` in the name of the one object that it is.
+    pub rename: Option<String>,
+    /// Name of a material of the scene file.
+    pub material: Option<String>,
+    /// Which sides reflect; one that emits does so from its back if that is `back`, else from its front.
+    #[serde(default, with = "values::by_name")]
+    pub sides: Option<Sides>,
+    /// Emitted radiance, W m⁻² sr⁻¹, linear RGB; 0 for none.
+    pub radiance_w_m2_sr: Option<OneOrThree>,
 }
 
 /// What of a light of a file is otherwise than there.

@@ -11,6 +11,12 @@ const README: &str = include_str!("../../../configs/README.md");
 fn every_key() -> SceneConfig {
     let v = Vector([1.0, 2.0, 3.0]);
     let c = Some(OneOrThree([1.0; 3]));
+    let part = PartOverride {
+        rename: Some("n".into()),
+        material: Some("m".into()),
+        sides: Some(Sides::Both),
+        radiance_w_m2_sr: c,
+    };
     let object = ObjectConfig {
         material: Some("m".into()),
         sides: Some(Sides::Both),
@@ -36,6 +42,7 @@ fn every_key() -> SceneConfig {
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
             materials: Some([("NAME".into(), "m".into())].into()),
+            parts: Some([("NAME".into(), part.clone())].into()),
         }),
         ply: Some(PlyConfig {
             path: "p".into(),
@@ -51,6 +58,7 @@ fn every_key() -> SceneConfig {
             exclude: Some(vec!["x".into()]),
             transmit: Some(vec!["x".into()]),
             materials: Some([("NAME".into(), "m".into())].into()),
+            parts: Some([("NAME".into(), part.clone())].into()),
             lights: Some(
                 [("NAME".into(), LightOverride { power_w: c, irradiance_w_m2: c, exclude: Some(true) })]
                     .into(),

@@ -13,7 +13,7 @@ mod values;
 pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
 pub use domain::{MAX_LENGTH_M, MAX_POWER};
-pub use imports::{AnimationChoice, GltfConfig, LightOverride, ObjConfig, PlyConfig, UpAxis};
+pub use imports::{AnimationChoice, GltfConfig, LightOverride, ObjConfig, PartOverride, PlyConfig, UpAxis};
 pub use sky::SkyConfig;
 pub use values::{OneOrThree, Vector};
 

@@ -18,6 +18,7 @@ pub(crate) use frame::Frame;
 pub(crate) use gltf::{FileCamera, Played, gltf_cameras, load_gltf};
 pub(crate) use obj::{NO_MATERIAL, load_obj};
 pub(crate) use ply::read_ply;
+pub(crate) use polygons::emitter_faces;
 pub(crate) use sky_map::read_radiances;
 
 use crate::{bake::EmitterFace, picture::Texture, primitives::Mesh};
@@ -84,7 +85,7 @@ pub(crate) struct Terms {
 #[derive(Debug, Default)]
 pub(crate) struct Group {
     pub(crate) mesh: Mesh,
-    /// The same surface as light sources would cover it.
+    /// The same surface as light sources would cover it; there may be none where the file's material does not emit.
     pub(crate) faces: Vec<EmitterFace>,
 }
 

@@ -33,3 +33,34 @@ pub(super) fn is_parallelogram(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> bool {
     let size = (c - a).length().max((d - b).length());
     (a - b + c - d).length() <= 1e-5 * size
 }
+
+/// The faces that lights would cover: two triangles in a row that make a parallelogram are one.
+pub(crate) fn emitter_faces(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<EmitterFace> {
+    let mut faces = Vec::new();
+    let mut rest = triangles;
+    while let [first, others @ ..] = rest {
+        rest = others;
+        let pair = others.first().and_then(|second| parallelogram(vertices, *first, *second));
+        if let Some(corners) = pair {
+            faces.push(EmitterFace::Parallelogram(corners));
+            rest = &others[1..];
+        } else {
+            faces.push(EmitterFace::Triangle(*first));
+        }
+    }
+    faces
+}
+
+/// A corner of the first triangle and the ends of the edges from it, if the second triangle makes it a parallelogram.
+fn parallelogram(vertices: &[DVec3], first: [u32; 3], second: [u32; 3]) -> Option<[u32; 3]> {
+    let at = |i: u32| vertices[i as usize];
+    (0..3).find_map(|i| {
+        let [corner, u, v] = [first[i], first[(i + 1) % 3], first[(i + 2) % 3]];
+        // The second triangle has the edge from u to v the other way round.
+        (0..3).find_map(|j| {
+            let [v2, u2, far] = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
+            let shared = at(v2) == at(v) && at(u2) == at(u);
+            (shared && is_parallelogram(at(corner), at(u), at(far), at(v))).then_some([corner, u, v])
+        })
+    })
+}

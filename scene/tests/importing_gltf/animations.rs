@@ -54,19 +54,19 @@ fn about(axis: DVec3, degrees: f64) -> [f64; 4] {
     DQuat::from_axis_angle(axis, degrees.to_radians()).to_array()
 }
 
-fn at(scene: &Scene, time_s: f64) -> Scene {
+pub(super) fn at(scene: &Scene, time_s: f64) -> Scene {
     let mut edit = scene.edit();
     scene.animation.apply(time_s, &mut edit).unwrap();
     edit.finish()
 }
 
 /// The corners of the square in the order of the file.
-fn square_of(map: impl Fn(DVec3) -> DVec3) -> Vec<Vec3> {
+pub(super) fn square_of(map: impl Fn(DVec3) -> DVec3) -> Vec<Vec3> {
     INDICES.iter().map(|&i| map(Vec3::from_array(CORNERS[i as usize]).as_dvec3()).as_vec3()).collect()
 }
 
 /// Positions of a few metres, files and scene in f32: 1e-6 each.
-fn assert_corners(scene: &Scene, object: &str, expected: &[Vec3]) {
+pub(super) fn assert_corners(scene: &Scene, object: &str, expected: &[Vec3]) {
     let found = corners(scene, object);
     let far = found.iter().zip(expected).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
     assert!(found.len() == expected.len() && far < 3e-6, "{object}: {far}\n{found:?}\n{expected:?}");
@@ -74,7 +74,7 @@ fn assert_corners(scene: &Scene, object: &str, expected: &[Vec3]) {
 
 /// An arm that turns about y in 2 s, a square at its end that rolls out in steps, a square that stands still, and a lamp on
 /// the arm; a second animation moves the still one.
-fn arm() -> Value {
+pub(super) fn arm() -> Value {
     let mut n = Numbers::default();
     let times = n.add(&[[0.0], [1.0], [2.0]]);
     let turn = n.add(&[about(DVec3::Y, 0.0), about(DVec3::Y, 90.0), about(DVec3::Y, 0.0)]);
@@ -107,7 +107,7 @@ fn arm() -> Value {
 }
 
 /// Where the hand's square is at a time, in the file's coordinates.
-fn hand(time_s: f64) -> impl Fn(DVec3) -> DVec3 {
+pub(super) fn hand(time_s: f64) -> impl Fn(DVec3) -> DVec3 {
     let time = time_s.rem_euclid(2.0);
     let turn = DQuat::from_rotation_y(FRAC_PI_2 * (1.0 - (1.0 - time).abs()));
     let out = if time < 0.5 {

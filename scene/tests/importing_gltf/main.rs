@@ -7,5 +7,6 @@ mod cameras;
 mod colours;
 mod files;
 mod geometry;
+mod parts;
 mod surfaces;
 mod textures;

@@ -1,10 +1,7 @@
 //! Turns a primitive of a glTF mesh into a surface of its own vertices, and that into a part of a group.
 
 use super::{Group, accessor::Accessors};
-use crate::{
-    bake::EmitterFace,
-    import::{polygons::is_parallelogram, unit},
-};
+use crate::import::{emitter_faces, unit};
 use glam::{DAffine2, DVec2, DVec3, Vec2, Vec3};
 use gltf::json::{
     accessor::Type,
@@ -153,35 +150,6 @@ pub(super) fn append(group: &mut Group, surface: Surface, emits: bool) {
     group.mesh.triangles.extend(triangles);
     if emits {
         let Group { mesh, faces } = group;
-        emitter_faces(&mesh.vertices, &mesh.triangles[start..], faces);
+        faces.extend(emitter_faces(&mesh.vertices, &mesh.triangles[start..]));
     }
-}
-
-/// The faces that lights would cover: two triangles in a row that make a parallelogram are one.
-fn emitter_faces(vertices: &[DVec3], triangles: &[[u32; 3]], faces: &mut Vec<EmitterFace>) {
-    let mut rest = triangles;
-    while let [first, others @ ..] = rest {
-        rest = others;
-        let pair = others.first().and_then(|second| parallelogram(vertices, *first, *second));
-        if let Some(corners) = pair {
-            faces.push(EmitterFace::Parallelogram(corners));
-            rest = &others[1..];
-        } else {
-            faces.push(EmitterFace::Triangle(*first));
-        }
-    }
-}
-
-/// A corner of the first triangle and the ends of the edges from it, if the second triangle makes it a parallelogram.
-fn parallelogram(vertices: &[DVec3], first: [u32; 3], second: [u32; 3]) -> Option<[u32; 3]> {
-    let at = |i: u32| vertices[i as usize];
-    (0..3).find_map(|i| {
-        let [corner, u, v] = [first[i], first[(i + 1) % 3], first[(i + 2) % 3]];
-        // The second triangle has the edge from u to v the other way round.
-        (0..3).find_map(|j| {
-            let [v2, u2, far] = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
-            let shared = at(v2) == at(v) && at(u2) == at(u);
-            (shared && is_parallelogram(at(corner), at(u), at(far), at(v))).then_some([corner, u, v])
-        })
-    })
 }
