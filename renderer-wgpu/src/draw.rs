@@ -6,13 +6,14 @@ use crate::{
     deferred::{DirectKind, Shown as ShownInputs},
     frame::{can_see, frame_uniform},
     gather::Gathering,
-    geometry::Geometry,
     openness::Openness,
     rays::{RayInputs, Rays, Traced},
+    renderer::OnDevice,
     scope::Scope,
     shadow_views::LightTable,
     stages::Stage,
     targets::Targets,
+    textures::Textures,
 };
 use glam::Vec3;
 use photonstream_renderer::Watch;
@@ -94,17 +95,6 @@ impl Renderer {
             self.gpu.queue.write_buffer(&self.frame_buffer, 0, bytemuck::bytes_of(&frame));
             self.frame = frame;
         }
-        let has_holes = scene.textures.as_ref().is_some_and(|textures| textures.has_holes);
-        let (light_rays, vsl_rays) =
-            (view.needs_direct() && view.shadows == Shadows::Rays, view.needs_indirect() && view.by_rays());
-        if has_holes && (light_rays || vsl_rays) {
-            return Err(GpuError::Unsupported {
-                option: if vsl_rays { "visibility rays".into() } else { "shadows rays".into() },
-                adapter: self.gpu.name(),
-                lacks: "rays that pass through the holes of this scene's textures".into(),
-                remedy: "choose --shadows maps and --visibility octahedral, or --renderer cpu",
-            });
-        }
         self.timer.restart();
         let mut scope = Scope {
             gpu: &self.gpu,
@@ -112,7 +102,7 @@ impl Renderer {
             timer: &mut self.timer,
             frame: &self.frame_buffer,
         };
-        let holes = scene.textures.as_ref().filter(|textures| textures.has_holes);
+        let holes = scene.textures.as_ref().filter(|textures| textures.holes().is_some());
         let (done, versions) = (&mut self.done, self.versions);
         let mut drawn = Drawn { redrawn: true, ..Drawn::default() };
         let aspect = view.width as f32 / view.height as f32;
@@ -142,7 +132,7 @@ impl Renderer {
                 done.set(Stage::Maps, view, versions);
             }
             if view.shadows == Shadows::Rays {
-                let rays = prepared(&mut self.rays, &self.gpu, &scene.geometry)?;
+                let rays = prepared(&mut self.rays, &self.gpu, scene)?;
                 let inputs = RayInputs {
                     frame: scope.frame,
                     gbuffer: &targets.gbuffer.view,
@@ -176,7 +166,7 @@ impl Renderer {
                 if ranged {
                     self.gather.encode_loss(&mut scope, targets, &scene.geometry, &self.vsls);
                 }
-                let rays = prepared(&mut self.rays, &self.gpu, &scene.geometry)?;
+                let rays = prepared(&mut self.rays, &self.gpu, scene)?;
                 let inputs = RayInputs {
                     frame: scope.frame,
                     gbuffer: &targets.gbuffer.view,
@@ -262,12 +252,14 @@ impl Drawn {
 }
 
 /// The shadow rays of the scene on the device.
-fn prepared<'a>(
-    rays: &'a mut Option<Rays>,
-    gpu: &Gpu,
-    geometry: &Geometry,
-) -> Result<&'a mut Rays, GpuError> {
-    let rays = rays.get_or_insert_with(|| Rays::new(gpu));
-    rays.set_geometry(gpu, &geometry.source)?;
-    Ok(rays)
+fn prepared<'a>(rays: &'a mut Option<Rays>, gpu: &Gpu, scene: &OnDevice) -> Result<&'a mut Rays, GpuError> {
+    let holes = scene.textures.as_ref().and_then(Textures::holes);
+    let geometry = &scene.geometry.source;
+    match rays {
+        Some(rays) => {
+            rays.set_geometry(gpu, geometry, holes)?;
+            Ok(rays)
+        }
+        None => Ok(rays.insert(Rays::new(gpu, geometry, holes)?)),
+    }
 }

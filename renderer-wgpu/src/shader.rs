@@ -22,6 +22,8 @@ const SHADOW_NAMED: &str = include_str!("../wgsl/shadow_named.wgsl");
 
 const RAYS_TRIANGLE: &str = include_str!("../wgsl/rays_triangle.wgsl");
 const RAYS_WALK: &str = include_str!("../wgsl/rays_walk.wgsl");
+const RAYS_SOLID: &str = include_str!("../wgsl/rays_solid.wgsl");
+const RAYS_HOLES: &str = include_str!("../wgsl/rays_holes.wgsl");
 const RAYS_PIXEL: &str = include_str!("../wgsl/rays_pixel.wgsl");
 
 macro_rules! sources {
@@ -40,10 +42,10 @@ macro_rules! sources {
 sources! {
     GBUFFER = "gbuffer" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, FRAME, PROJECTION, CORNER];
     GBUFFER_TEXTURED = "gbuffer_textured" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::TEXTURE, FRAME, PROJECTION, CORNER
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::WRAP, wgsl::TEXTURE, FRAME, PROJECTION, CORNER
     ];
     SHADOW_MAP = "shadow_map" [];
-    SHADOW_MAP_HOLES = "shadow_map_holes" [wgsl::TEXTURE];
+    SHADOW_MAP_HOLES = "shadow_map_holes" [wgsl::WRAP, wgsl::TEXTURE];
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
@@ -63,12 +65,18 @@ sources! {
     COMPOSITE = "composite" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::BASIS, wgsl::SKY, FRAME];
     DISC = "disc" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, FRAME, PROJECTION, VSL];
     RAYS_DIRECT = "rays_direct" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, wgsl::BASIS, wgsl::SKY, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, wgsl::BASIS, wgsl::SKY, FRAME, RAYS_TRIANGLE, RAYS_SOLID, RAYS_WALK, RAYS_PIXEL
+    ];
+    RAYS_DIRECT_HOLES = "rays_direct" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, wgsl::BASIS, wgsl::SKY, wgsl::WRAP, FRAME, RAYS_TRIANGLE, RAYS_HOLES, RAYS_WALK, RAYS_PIXEL
     ];
     RAYS_INDIRECT = "rays_indirect" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_SOLID, RAYS_WALK, RAYS_PIXEL
     ];
-    RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_TRIANGLE, RAYS_WALK, RAYS_PIXEL];
+    RAYS_INDIRECT_HOLES = "rays_indirect" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::WRAP, FRAME, VSL, VSL_PATCH, RAYS_TRIANGLE, RAYS_HOLES, RAYS_WALK, RAYS_PIXEL
+    ];
+    RAYS_NOISE = "rays_noise" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME, RAYS_TRIANGLE, RAYS_SOLID, RAYS_WALK, RAYS_PIXEL];
     PRESENT = "present" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::TONE, FRAME];
 }
 

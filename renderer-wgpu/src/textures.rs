@@ -9,7 +9,7 @@ use crate::{
     layout::{TextureCorner, TextureLayoutUniform},
 };
 use glam::Vec2;
-use photonstream_scene::{Scene, Texture};
+use photonstream_scene::{ObjectId, Scene, Texture};
 use photonstream_shading::texture;
 use std::sync::Arc;
 use wgpu::BufferUsages;
@@ -23,26 +23,30 @@ pub(crate) struct Textures {
     /// One for each object; without levels for those without a texture.
     pub(crate) layouts: wgpu::Buffer,
     /// Whether any has holes.
-    pub(crate) has_holes: bool,
+    has_holes: bool,
     /// What it was made from.
-    source: Source,
+    source: Arc<Source>,
 }
 
+/// What the textures on a device are made from.
 #[derive(Debug)]
-struct Source {
+pub(crate) struct Source {
     uvs: Arc<[Vec2]>,
     triangles: Arc<[[u32; 3]]>,
+    object_of: Arc<[ObjectId]>,
     rest_vertices: Arc<[glam::Vec3]>,
     of_object: Vec<Option<Texture>>,
 }
 
 impl Source {
-    fn of(scene: &Scene) -> Self {
+    /// That of a scene with texture coordinates.
+    pub(crate) fn of(scene: &Scene) -> Self {
         let geometry = &scene.geometry;
         let of_object = scene.objects.iter().map(|o| scene.materials[o.material.0 as usize].texture.clone());
         Self {
             uvs: Arc::clone(&geometry.uvs),
             triangles: Arc::clone(&geometry.triangles),
+            object_of: Arc::clone(&geometry.object_of),
             rest_vertices: Arc::clone(&geometry.rest_vertices),
             of_object: of_object.collect(),
         }
@@ -54,12 +58,39 @@ impl Source {
         }
         same(&self.uvs, &other.uvs)
             && same(&self.triangles, &other.triangles)
+            && same(&self.object_of, &other.object_of)
             && same(&self.rest_vertices, &other.rest_vertices)
             && self.of_object == other.of_object
+    }
+
+    /// Number of the scene's triangles.
+    pub(crate) fn triangle_count(&self) -> u32 {
+        self.triangles.len() as u32
+    }
+
+    /// The texture of each object that has holes.
+    pub(crate) fn holes(&self) -> impl Iterator<Item = Option<&Texture>> {
+        let has_holes = |texture: &&Texture| texture.cutoff.is_some();
+        self.of_object.iter().map(move |texture| texture.as_ref().filter(has_holes))
+    }
+
+    /// The number of a triangle's object.
+    pub(crate) fn object_of(&self, triangle: u32) -> usize {
+        self.object_of[triangle as usize].0 as usize
+    }
+
+    /// The texture coordinates of the corners of a triangle.
+    pub(crate) fn uv_triangle(&self, triangle: u32) -> [Vec2; 3] {
+        self.triangles[triangle as usize].map(|vertex| self.uvs[vertex as usize])
     }
 }
 
 impl Textures {
+    /// What the holes of these textures are found in, where there are any.
+    pub(crate) fn holes(&self) -> Option<&Arc<Source>> {
+        self.has_holes.then_some(&self.source)
+    }
+
     /// The textures of `scene`, or `last` where they are the same; `None` for a scene without, and whether they are new.
     pub(crate) fn update(gpu: &Gpu, scene: &Scene, last: Option<Self>) -> (Option<Self>, bool) {
         if !scene.is_textured() || scene.geometry.uvs.is_empty() {
@@ -88,7 +119,7 @@ impl Textures {
             texels: upload("texels", bytemuck::cast_slice(&texels), BufferUsages::STORAGE),
             layouts: upload("layouts of textures", bytemuck::cast_slice(&layouts), BufferUsages::STORAGE),
             has_holes: scene.bvh.has_holes(),
-            source,
+            source: Arc::new(source),
         }
     }
 }

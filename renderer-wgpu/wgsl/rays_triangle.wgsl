@@ -88,6 +88,18 @@ fn triangle_hit(f: RayFrame, v0: vec3f, v1: vec3f, v2: vec3f, normal: vec3f) -> 
     return entry <= exit && t > 0.0 && t < f.t_max;
 }
 
+// Barycentric (u, v) of where a ray that hits a triangle does; twin of `resolve`, with edge functions rounded to f32.
+fn triangle_place(f: RayFrame, v0: vec3f, v1: vec3f, v2: vec3f) -> vec2f {
+    let a = ray_permuted(v0 - f.origin, f.axis);
+    let b = ray_permuted(v1 - f.origin, f.axis);
+    let c = ray_permuted(v2 - f.origin, f.axis);
+    let p = a.xy - f.shear * a.z;
+    let q = b.xy - f.shear * b.z;
+    let r = c.xy - f.shear * c.z;
+    let edges = vec3f(r.x * q.y - r.y * q.x, p.x * r.y - p.y * r.x, q.x * p.y - q.y * p.x);
+    return edges.yz / (edges.x + edges.y + edges.z);
+}
+
 // Sign of p.x q.y - p.y q.x, exact: rounding keeps the order of two products, or makes them equal.
 fn edge_sign(p: vec2f, q: vec2f) -> i32 {
     let first = p.x * q.y;

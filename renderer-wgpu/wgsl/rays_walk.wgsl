@@ -1,4 +1,5 @@
 // Turns a ray and the scene's compressed tree into whether anything lies along it; answers as the CPU's `occluded`.
+// The module that includes it has `triangle_stops`.
 
 @group(1) @binding(1) var<storage, read> nodes: array<vec4u>;       // five words of four for each node
 @group(1) @binding(2) var<storage, read> triangles: array<vec4f>;   // three corners each, unit normal in the fourth components
@@ -54,7 +55,7 @@ fn walk(f: RayFrame) -> u32 {
             let v0 = triangles[triangle * 3u];
             let v1 = triangles[triangle * 3u + 1u];
             let v2 = triangles[triangle * 3u + 2u];
-            if triangle_hit(f, v0.xyz, v1.xyz, v2.xyz, vec3f(v0.w, v1.w, v2.w)) {
+            if triangle_stops(f, triangle, v0, v1, v2) {
                 return WALK_HIT;
             }
         }

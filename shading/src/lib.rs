@@ -20,6 +20,7 @@ pub mod surface;
 pub mod texture;
 pub mod tone;
 pub mod wgsl;
+mod wrap;
 
 pub use camera::Camera;
 pub use kernel::Kernel;

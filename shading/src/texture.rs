@@ -4,6 +4,8 @@
 //! lower half first. Levels lie one after the other, the finest first; each has half the edges of the one before,
 //! rounded down, and at least 1.
 
+pub use crate::wrap::Wrap;
+use crate::wrap::{neighbour, wrapped};
 use glam::{Vec2, Vec3, Vec4};
 
 /// Where the texels of a texture lie, and how it goes on beyond [0, 1].
@@ -21,19 +23,6 @@ pub struct Layout {
     pub wrap_u: Wrap,
     /// How rows go on.
     pub wrap_v: Wrap,
-}
-
-/// How a texture goes on beyond its edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[repr(u32)]
-pub enum Wrap {
-    /// Again and again.
-    #[default]
-    Repeat = 0,
-    /// Again and again, every other time mirrored.
-    Mirror = 1,
-    /// With its outermost texels.
-    Clamp = 2,
 }
 
 /// One level of a texture: number of its first texel, columns, rows.
@@ -108,28 +97,6 @@ pub fn bilinear(texels: &[[u32; 2]], layout: &Layout, uv: Vec2, index: u32) -> V
     let upper = texel(columns[0], rows[0]) * (1.0 - fraction.x) + texel(columns[1], rows[0]) * fraction.x;
     let lower = texel(columns[0], rows[1]) * (1.0 - fraction.x) + texel(columns[1], rows[1]) * fraction.x;
     upper * (1.0 - fraction.y) + lower * fraction.y
-}
-
-/// A coordinate brought into [0, 1].
-fn wrapped(u: f32, wrap: Wrap) -> f32 {
-    match wrap {
-        Wrap::Repeat => u - u.floor(),
-        Wrap::Mirror => 1.0 - (u - (u * 0.5).floor() * 2.0 - 1.0).abs(),
-        Wrap::Clamp => u.clamp(0.0, 1.0),
-    }
-}
-
-/// The texel that stands for `index`, which is at most one beyond the `count` of a row or column.
-fn neighbour(index: i32, count: i32, wrap: Wrap) -> i32 {
-    if wrap == Wrap::Repeat {
-        if index < 0 {
-            return count - 1;
-        }
-        if index >= count {
-            return 0;
-        }
-    }
-    index.clamp(0, count - 1)
 }
 
 /// The four fractions of a texel.

@@ -30,13 +30,15 @@ pub const SKY: &str = include_str!("../wgsl/sky.wgsl");
 pub const SOBOL: &str = include_str!("../wgsl/sobol.wgsl");
 /// Twin of [`crate::surface`]: the shading normal.
 pub const SURFACE: &str = include_str!("../wgsl/surface.wgsl");
-/// Twin of [`crate::texture`]; the module that includes it has `texels: array<vec2u>`.
+/// Twin of [`crate::texture`]; the module that includes it has `texels: array<vec2u>`, and [`WRAP`].
 pub const TEXTURE: &str = include_str!("../wgsl/texture.wgsl");
 /// Twin of [`crate::tone`].
 pub const TONE: &str = include_str!("../wgsl/tone.wgsl");
+/// Twin of the wraps of [`crate::texture`].
+pub const WRAP: &str = include_str!("../wgsl/wrap.wgsl");
 
 /// Every twin with its file's stem.
-pub const TWINS: [(&str, &str); 13] = [
+pub const TWINS: [(&str, &str); 14] = [
     ("kernel", KERNEL),
     ("basis", BASIS),
     ("distance_map", DISTANCE_MAP),
@@ -50,6 +52,7 @@ pub const TWINS: [(&str, &str); 13] = [
     ("surface", SURFACE),
     ("texture", TEXTURE),
     ("tone", TONE),
+    ("wrap", WRAP),
 ];
 
 /// Number of a light's kind in shaders and in published records.

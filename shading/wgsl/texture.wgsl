@@ -1,4 +1,5 @@
-// Turns texture coordinates into a colour: twin of texture.rs. The module that includes it has `texels: array<vec2u>`.
+// Turns texture coordinates into a colour: twin of texture.rs. The module that includes it has `texels: array<vec2u>`, and
+// wrap.wgsl.
 
 struct TextureLayout {
     first: u32,
@@ -47,40 +48,18 @@ fn texture_sample(picture: TextureLayout, uv: vec2f, level: f32) -> vec4f {
 fn texture_bilinear(picture: TextureLayout, uv: vec2f, index: u32) -> vec4f {
     let level = texture_level(picture, index);
     let size = vec2f(f32(level.width), f32(level.height));
-    let place = vec2f(texture_wrapped(uv.x, picture.wrap_u), texture_wrapped(uv.y, picture.wrap_v)) * size - 0.5;
+    let place = vec2f(wrap_wrapped(uv.x, picture.wrap_u), wrap_wrapped(uv.y, picture.wrap_v)) * size - 0.5;
     let low = floor(place);
     let fraction = place - low;
     let column = i32(low.x);
     let row = i32(low.y);
-    let left = texture_neighbour(column, i32(level.width), picture.wrap_u);
-    let right = texture_neighbour(column + 1, i32(level.width), picture.wrap_u);
-    let top = level.first + texture_neighbour(row, i32(level.height), picture.wrap_v) * level.width;
-    let bottom = level.first + texture_neighbour(row + 1, i32(level.height), picture.wrap_v) * level.width;
+    let left = wrap_neighbour(column, i32(level.width), picture.wrap_u);
+    let right = wrap_neighbour(column + 1, i32(level.width), picture.wrap_u);
+    let top = level.first + wrap_neighbour(row, i32(level.height), picture.wrap_v) * level.width;
+    let bottom = level.first + wrap_neighbour(row + 1, i32(level.height), picture.wrap_v) * level.width;
     let upper = texture_unpack(texels[top + left]) * (1.0 - fraction.x) + texture_unpack(texels[top + right]) * fraction.x;
     let lower = texture_unpack(texels[bottom + left]) * (1.0 - fraction.x) + texture_unpack(texels[bottom + right]) * fraction.x;
     return upper * (1.0 - fraction.y) + lower * fraction.y;
-}
-
-fn texture_wrapped(u: f32, wrap: u32) -> f32 {
-    if wrap == TEXTURE_REPEAT {
-        return u - floor(u);
-    }
-    if wrap == TEXTURE_MIRROR {
-        return 1.0 - abs(u - floor(u * 0.5) * 2.0 - 1.0);
-    }
-    return clamp(u, 0.0, 1.0);
-}
-
-fn texture_neighbour(index: i32, count: i32, wrap: u32) -> u32 {
-    if wrap == TEXTURE_REPEAT {
-        if index < 0 {
-            return u32(count - 1);
-        }
-        if index >= count {
-            return 0u;
-        }
-    }
-    return u32(clamp(index, 0, count - 1));
 }
 
 fn texture_unpack(texel: vec2u) -> vec4f {

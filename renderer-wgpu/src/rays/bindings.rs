@@ -13,7 +13,8 @@ pub(super) struct Layouts {
 }
 
 impl Layouts {
-    pub(super) fn new(gpu: &Gpu) -> Self {
+    /// With a place for the masks of holes if there are any.
+    pub(super) fn new(gpu: &Gpu, with_holes: bool) -> Self {
         use wgpu::{
             BindingType, BufferBindingType, StorageTextureAccess, TextureSampleType, TextureViewDimension,
         };
@@ -51,6 +52,8 @@ impl Layouts {
             })
         };
         let dispatch = buffer(BufferBindingType::Uniform, true);
+        let tracing =
+            [(0, dispatch), (1, read()), (2, read()), (3, write()), (4, write()), (5, write()), (6, read())];
         Self {
             inputs: [
                 layout(&[
@@ -64,14 +67,7 @@ impl Layouts {
                 ]),
                 layout(&[(0, frame), (4, write())]),
             ],
-            tracing: layout(&[
-                (0, dispatch),
-                (1, read()),
-                (2, read()),
-                (3, write()),
-                (4, write()),
-                (5, write()),
-            ]),
+            tracing: layout(if with_holes { &tracing } else { &tracing[..6] }),
         }
     }
 }
@@ -97,14 +93,12 @@ pub(super) fn pipeline(
     })
 }
 
-pub(super) fn bind<const N: usize>(
+pub(super) fn bind<'a>(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
-    bindings: &[u32; N],
-    resources: [wgpu::BindingResource<'_>; N],
+    resources: impl IntoIterator<Item = (u32, wgpu::BindingResource<'a>)>,
 ) -> wgpu::BindGroup {
-    let entries =
-        bindings.iter().zip(resources).map(|(&binding, resource)| wgpu::BindGroupEntry { binding, resource });
+    let entries = resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
     let entries: Vec<_> = entries.collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("rays"),
@@ -116,6 +110,12 @@ pub(super) fn bind<const N: usize>(
 pub(super) fn buffer(gpu: &Gpu, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
     let label = Some(label);
     gpu.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+}
+
+/// Most bytes of a buffer that shaders read.
+pub(super) fn limit(gpu: &Gpu) -> u64 {
+    let limits = gpu.device.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
 pub(super) fn upload(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {

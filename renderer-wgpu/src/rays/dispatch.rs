@@ -59,8 +59,7 @@ pub(super) struct Pass<'a> {
 
 impl Workspace {
     pub(super) fn new(gpu: &Gpu, rays: &Rays, size: [u32; 2], band_bytes: u64) -> Result<Self, GpuError> {
-        let limits = gpu.device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = super::bindings::limit(gpu);
         let row_bytes = u64::from(size[0]) * STACK_OF_PIXEL;
         if row_bytes > limit {
             let remedy = "choose a smaller --size";
@@ -93,7 +92,9 @@ impl Workspace {
             stacks.as_entire_binding(),
             counts.as_entire_binding(),
         ];
-        let group = super::bindings::bind(gpu, &rays.layouts.tracing, &[0, 1, 2, 3, 4, 5], resources);
+        let holes = rays.holes.as_ref().map(|holes| holes.words.as_entire_binding());
+        let group =
+            super::bindings::bind(gpu, &rays.layouts.tracing, (0..).zip(resources.into_iter().chain(holes)));
         Ok(Self { size, band_rows, pixels: states, uniforms, counts, counts_read, group })
     }
 

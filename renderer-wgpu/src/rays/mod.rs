@@ -1,8 +1,8 @@
 //! Turns lights and virtual surface lights into irradiance by shadow rays that compute shaders trace.
 //!
 //! The scene's triangles lie in a compressed eight-wide tree (`tree`). Every ray that a shader asks gets the answer of
-//! `scene.bvh.occluded`: the same shear, edge functions of exact sign, the same padded boxes. Distances are `f32` here
-//! and `f64` there, so answers may differ for rays that end within rounding of a surface.
+//! `scene.bvh.occluded`: the same shear, edge functions of exact sign, the same padded boxes, the same holes (`holes`). Distances
+//! are `f32` here and `f64` there, so answers may differ for rays that end within rounding of a surface or of a hole's outline.
 //!
 //! A driver may end an invocation's loops in silence after 65 535 turns (Mesa's software rasteriser before 23), counted
 //! over all of them by the longest of up to 16 lanes. So a dispatch stops after [`RAY_TURNS`] turns of a pixel, keeps the
@@ -23,15 +23,17 @@
 
 mod bindings;
 mod dispatch;
+mod holes;
 mod noise;
 #[cfg(test)]
 mod tests;
 mod tree;
 
-use crate::{Gpu, GpuError, shader, sky::SkyOnDevice};
+use crate::{Gpu, GpuError, shader, sky::SkyOnDevice, textures::Source};
 use bindings::{Layouts, bind, pipeline, upload};
 use dispatch::{Pass, Workspace};
 use glam::Vec3;
+use holes::HolesOnDevice;
 use noise::Noise;
 use photonstream_renderer::{
     Watch,
@@ -91,6 +93,7 @@ pub(crate) fn constants() -> String {
         text.push_str(&format!("const {name}: f32 = {value:?}f;\n"));
     }
     let [r, g, b] = [Vec3::X, Vec3::Y, Vec3::Z].map(photonstream_shading::tone::luminance);
+    text.push_str(&holes::constants());
     text.push_str(&format!("const LUMINANCE: vec3f = vec3f({r:?}f, {g:?}f, {b:?}f);\n"));
     text
 }
@@ -140,9 +143,10 @@ pub(crate) struct Rays {
     direct: wgpu::ComputePipeline,
     weigh: wgpu::ComputePipeline,
     indirect: wgpu::ComputePipeline,
-    source: Option<Arc<Geometry>>,
+    source: Arc<Geometry>,
     nodes: wgpu::Buffer,
     triangles: wgpu::Buffer,
+    holes: Option<HolesOnDevice>,
     bounds: [Vec3; 2],
     workspace: Option<Workspace>,
     noise: Noise,
@@ -150,47 +154,81 @@ pub(crate) struct Rays {
 }
 
 impl Rays {
-    /// Without any geometry: every ray misses.
-    pub(crate) fn new(gpu: &Gpu) -> Self {
-        let layouts = Layouts::new(gpu);
-        let pipeline = |source, entry, inputs| pipeline(gpu, source, entry, [inputs, &layouts.tracing]);
-        let direct = pipeline(&shader::RAYS_DIRECT, "trace_direct", &layouts.inputs[0]);
-        let weigh = pipeline(&shader::RAYS_INDIRECT, "weigh", &layouts.inputs[0]);
-        let indirect = pipeline(&shader::RAYS_INDIRECT, "trace_indirect", &layouts.inputs[0]);
-        let noise = Noise::new(pipeline(&shader::RAYS_NOISE, "sum_rows", &layouts.inputs[1]));
-        let tree = Tree::new(&Geometry::default());
-        let upload = |label, bytes| upload(gpu, label, bytes);
-        Self {
-            nodes: upload("ray-tracing nodes", bytemuck::cast_slice(&tree.nodes)),
-            triangles: upload("ray-tracing triangles", bytemuck::cast_slice(&tree.triangles)),
-            bounds: tree.bounds,
-            layouts,
-            direct,
-            weigh,
-            indirect,
-            source: None,
-            workspace: None,
-            noise,
-            band_bytes: Self::band_bytes(),
-        }
-    }
-
-    /// Traces against `geometry` from now on; its tree is built only when it has changed.
+    /// Traces against `geometry`, through its `holes`: shaders ask for them only where there are any.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] for more triangles than a binding holds, or a tree deeper than a ray's stack.
-    pub(crate) fn set_geometry(&mut self, gpu: &Gpu, geometry: &Arc<Geometry>) -> Result<(), GpuError> {
-        let known = self.source.as_ref();
-        if known.is_some_and(|g| Arc::ptr_eq(g, geometry) || **g == **geometry) {
-            self.source = Some(Arc::clone(geometry));
+    /// [`GpuError::TooLarge`] for more triangles or masks than a binding holds, or a tree deeper than a ray's stack;
+    /// [`GpuError::Unsupported`] where the device has too few bindings for holes.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        geometry: &Arc<Geometry>,
+        holes: Option<&Arc<Source>>,
+    ) -> Result<Self, GpuError> {
+        if holes.is_some() {
+            let limits = gpu.device.limits();
+            holes::check_buffers(limits.max_storage_buffers_per_shader_stage, &gpu.name())?;
+        }
+        let tree = Tree::new(geometry);
+        check_size(gpu, &tree)?;
+        let holes = holes.map(|source| HolesOnDevice::new(gpu, source, &tree.ids)).transpose()?;
+        let layouts = Layouts::new(gpu, holes.is_some());
+        let pipeline = |source, entry, inputs| pipeline(gpu, source, entry, [inputs, &layouts.tracing]);
+        let [direct, indirect] = match &holes {
+            None => [&shader::RAYS_DIRECT, &shader::RAYS_INDIRECT],
+            Some(_) => [&shader::RAYS_DIRECT_HOLES, &shader::RAYS_INDIRECT_HOLES],
+        };
+        let upload = |label, bytes| upload(gpu, label, bytes);
+        Ok(Self {
+            direct: pipeline(direct, "trace_direct", &layouts.inputs[0]),
+            weigh: pipeline(indirect, "weigh", &layouts.inputs[0]),
+            indirect: pipeline(indirect, "trace_indirect", &layouts.inputs[0]),
+            noise: Noise::new(pipeline(&shader::RAYS_NOISE, "sum_rows", &layouts.inputs[1])),
+            nodes: upload("ray-tracing nodes", bytemuck::cast_slice(&tree.nodes)),
+            triangles: upload("ray-tracing triangles", bytemuck::cast_slice(&tree.triangles)),
+            holes,
+            bounds: tree.bounds,
+            layouts,
+            source: Arc::clone(geometry),
+            workspace: None,
+            band_bytes: Self::band_bytes(),
+        })
+    }
+
+    /// Traces against `geometry` from now on; its tree is built only when it has changed, and masks of holes are uploaded
+    /// only when they have.
+    ///
+    /// # Errors
+    /// As [`Rays::new`].
+    pub(crate) fn set_geometry(
+        &mut self,
+        gpu: &Gpu,
+        geometry: &Arc<Geometry>,
+        holes: Option<&Arc<Source>>,
+    ) -> Result<(), GpuError> {
+        if self.holes.is_some() != holes.is_some() {
+            *self = Self::new(gpu, geometry, holes)?;
+            return Ok(());
+        }
+        let same_holes = match (&self.holes, holes) {
+            (Some(known), Some(source)) => known.are_of(source),
+            _ => true,
+        };
+        let same = Arc::ptr_eq(&self.source, geometry) || *self.source == **geometry;
+        self.source = Arc::clone(geometry);
+        if same && same_holes {
             return Ok(());
         }
         let tree = Tree::new(geometry);
         check_size(gpu, &tree)?;
         self.nodes = upload(gpu, "ray-tracing nodes", bytemuck::cast_slice(&tree.nodes));
         self.triangles = upload(gpu, "ray-tracing triangles", bytemuck::cast_slice(&tree.triangles));
+        if let Some(source) = holes {
+            let linked = same_holes && self.holes.as_ref().is_some_and(|known| known.relink(gpu, &tree.ids));
+            if !linked {
+                self.holes = Some(HolesOnDevice::new(gpu, source, &tree.ids)?);
+            }
+        }
         self.bounds = tree.bounds;
-        self.source = Some(Arc::clone(geometry));
         self.workspace = None;
         Ok(())
     }
@@ -290,8 +328,7 @@ impl Rays {
         bind(
             gpu,
             &self.layouts.inputs[0],
-            &[0, 1, 2, 3, 4, 5, 6],
-            [
+            (0..).zip([
                 inputs.frame.as_entire_binding(),
                 wgpu::BindingResource::TextureView(inputs.gbuffer),
                 inputs.lights.as_entire_binding(),
@@ -299,15 +336,14 @@ impl Rays {
                 inputs.patches.as_entire_binding(),
                 inputs.sky.numbers.as_entire_binding(),
                 wgpu::BindingResource::TextureView(&inputs.sky.map),
-            ],
+            ]),
         )
     }
 }
 
 /// Whether the device takes a tree, and a ray's stack its depth.
 fn check_size(gpu: &Gpu, tree: &Tree) -> Result<(), GpuError> {
-    let limits = gpu.device.limits();
-    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let limit = bindings::limit(gpu);
     let sizes = [
         ("ray-tracing nodes in bytes", size_of_val(&tree.nodes[..]) as u64, limit),
         ("ray-tracing triangles in bytes", size_of_val(&tree.triangles[..]) as u64, limit),

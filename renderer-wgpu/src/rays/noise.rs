@@ -42,7 +42,7 @@ impl Noise {
         frame: &wgpu::Buffer,
     ) -> wgpu::BindGroup {
         let rows = self.rows.as_ref().expect("invariant: prepare makes the buffer");
-        super::bindings::bind(gpu, layout, &[0, 4], [frame.as_entire_binding(), rows.as_entire_binding()])
+        super::bindings::bind(gpu, layout, [(0, frame.as_entire_binding()), (4, rows.as_entire_binding())])
     }
 
     pub(super) fn read(&self, gpu: &Gpu) -> Result<Option<f64>, GpuError> {

@@ -17,6 +17,7 @@ use std::path::Path;
 use wgpu::{BufferUsages, TextureUsages};
 
 mod answers;
+mod holes;
 mod pictures;
 mod splitting;
 
@@ -26,6 +27,12 @@ fn scene(text: &str) -> Scene {
 
 fn config(name: &str) -> Scene {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name)).unwrap()
+}
+
+/// Rays against `scene` and its holes.
+fn rays_of(gpu: &Gpu, scene: &Scene) -> Rays {
+    let holes = scene.bvh.has_holes().then(|| Arc::new(Source::of(scene)));
+    Rays::new(gpu, &scene.geometry, holes.as_ref()).unwrap()
 }
 
 /// A picture on the device: what each pixel sees, taken from the CPU's rays, and the frame's numbers.
@@ -86,8 +93,7 @@ impl Picture {
         let copied = gbuffer.texture.as_image_copy();
         gpu.queue.write_texture(copied, bytemuck::cast_slice(&words), row, gbuffer.texture.size());
         let usage = TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC;
-        let mut rays = Rays::new(gpu);
-        rays.set_geometry(gpu, &scene.geometry).unwrap();
+        let rays = rays_of(gpu, scene);
         let mut sky = SkyOnDevice::new(gpu);
         sky.update(gpu, &scene.lights).unwrap();
         let bytes = size_of::<FrameUniform>() as u64;

@@ -31,6 +31,8 @@ const LEAF_TRIANGLES: u32 = 3;
 pub(super) struct Tree {
     pub(super) nodes: Vec<CwBvhNode>,
     pub(super) triangles: Vec<[[f32; 4]; 3]>,
+    /// Which of the scene's each triangle is; none where one stands for none.
+    pub(super) ids: Vec<u32>,
     /// Lower and upper corner; twice the origin if there is nothing.
     pub(super) bounds: [Vec3; 2],
     /// Levels of nodes.
@@ -40,18 +42,18 @@ pub(super) struct Tree {
 impl Tree {
     /// Triangles that cannot be hit are left out: coordinates not finite or too large, no area.
     pub(super) fn new(geometry: &Geometry) -> Self {
-        let solid: Vec<([Vec3; 3], Vec3)> = (0..geometry.triangles.len() as u32)
-            .map(|id| geometry.triangle(id))
-            .filter(|corners| {
+        let solid: Vec<([Vec3; 3], Vec3, u32)> = (0..geometry.triangles.len() as u32)
+            .map(|id| (geometry.triangle(id), id))
+            .filter(|(corners, _)| {
                 corners.iter().all(|v| v.is_finite() && v.abs().max_element() <= MAX_COORDINATE)
             })
-            .filter_map(|corners| Some((corners, surface::normal(corners)?)))
+            .filter_map(|(corners, id)| Some((corners, surface::normal(corners)?, id)))
             .collect();
-        let boxes: Vec<Aabb> = solid.iter().map(|(v, _)| Aabb::from_points(&v.map(Vec3A::from))).collect();
+        let boxes: Vec<Aabb> = solid.iter().map(|(v, ..)| Aabb::from_points(&v.map(Vec3A::from))).collect();
         if boxes.is_empty() {
             // A node without children: every ray misses.
             let (nodes, triangles) = (vec![CwBvhNode::default()], vec![[[0.0; 4]; 3]]);
-            return Self { nodes, triangles, bounds: [Vec3::ZERO; 2], depth: 1 };
+            return Self { nodes, triangles, ids: Vec::new(), bounds: [Vec3::ZERO; 2], depth: 1 };
         }
         let bounds = boxes.iter().fold(Aabb::INVALID, |all, b| all.union(b));
         let mut wide = clustered(&boxes).map(|binary| compress(&binary));
@@ -62,11 +64,12 @@ impl Tree {
         let wide = wide.unwrap_or_default();
         let depth = depth(&wide);
         let triangles = wide.primitive_indices.iter().map(|&index| {
-            let (corners, normal) = &solid[index as usize];
+            let (corners, normal, _) = &solid[index as usize];
             [0, 1, 2].map(|i| [corners[i].x, corners[i].y, corners[i].z, normal[i]])
         });
         let triangles = triangles.collect();
-        Self { nodes: wide.nodes, triangles, bounds: [bounds.min.into(), bounds.max.into()], depth }
+        let ids = wide.primitive_indices.iter().map(|&index| solid[index as usize].2).collect();
+        Self { nodes: wide.nodes, triangles, ids, bounds: [bounds.min.into(), bounds.max.into()], depth }
     }
 }
 

@@ -7,6 +7,8 @@ mod approximations;
 mod edited;
 mod emissive;
 mod extremes;
+mod fence;
+mod holes;
 mod only_what_changed;
 mod scenes;
 mod sky;

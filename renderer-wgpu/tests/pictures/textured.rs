@@ -3,7 +3,7 @@
 use crate::scenes::{Lit, layer, lit, rel_rmse};
 use glam::Vec3;
 use photonstream_renderer::LayerKind;
-use photonstream_renderer_wgpu::{GpuError, Shadows, View};
+use photonstream_renderer_wgpu::{Shadows, View};
 use photonstream_scene::Visibility;
 
 /// A floor of 4 m with a picture of 64² pixels on each metre, and above it a plate of 1 m with a hole in each of 3² squares.
@@ -68,21 +68,4 @@ fn textures_and_holes_are_the_cpus() {
     assert!(shadowed.count() > 100);
     let colours = expected[0].iter().map(|a| (a.x * 32.0) as u32).collect::<std::collections::BTreeSet<_>>();
     assert!(colours.len() > 10, "{colours:?}");
-}
-
-/// Rays do not know holes on the GPU: that is said, not drawn wrong.
-#[test]
-fn rays_through_holes_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let lit = room(folder.path());
-    let Some(mut renderer) = lit.renderer() else { return };
-    for view in [
-        View { shadows: Shadows::Rays, ..lit.view(8, 8) },
-        View { visibility: Visibility::Rays, ..lit.view(8, 8) },
-    ] {
-        let error = renderer.draw(&view).unwrap_err();
-        assert!(matches!(error, GpuError::Unsupported { .. }), "{error}");
-        assert!(error.to_string().contains("holes"), "{error}");
-    }
-    assert!(renderer.draw(&lit.view(8, 8)).unwrap().redrawn);
 }

@@ -15,7 +15,7 @@ fn texel(i: u32) -> [u32; 2] {
 /// Every wrap, odd edges, and levels from the finest to beyond the coarsest; coordinates in [-2, 2].
 #[test]
 fn texture_lookups() {
-    let parts = ["var<private> texels: array<vec2u, 18>;", wgsl::TEXTURE];
+    let parts = ["var<private> texels: array<vec2u, 18>;", wgsl::WRAP, wgsl::TEXTURE];
     let body = "for (var i = 0u; i < 18u; i++) {
             texels[i] = vec2u(i * 0x9E3779B9u, (i * 0x85EBCA6Bu) ^ 0x12345678u);
         }
@@ -40,7 +40,7 @@ fn texture_lookups() {
     });
     let body = "y[0] = texture_level_of_width(x[0] * 100.0, x[1]);
         y[1] = texture_footprint(x[2], x[3] * 10.0, x[4]);";
-    let parts = ["var<private> texels: array<vec2u, 18>;", wgsl::TEXTURE];
+    let parts = ["var<private> texels: array<vec2u, 18>;", wgsl::WRAP, wgsl::TEXTURE];
     check("texture_level", &parts, body, 1.0, &uniform(), |x| {
         [texture::level_of_width(x[0] * 100.0, x[1]), texture::footprint(x[2], x[3] * 10.0, x[4]), 0.0, 0.0]
     });

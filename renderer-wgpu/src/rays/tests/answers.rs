@@ -1,24 +1,32 @@
 //! Turns rays into the claim that the device answers each as the CPU's structure does.
 
 use super::*;
-use crate::{
-    pipelines::{computing, groups_of_64},
-    shader::Source,
-};
+use crate::pipelines::{computing, groups_of_64};
 
-const ANSWERS: Source = Source {
+const ANSWERS: shader::Source = shader::Source {
     name: "rays_answers",
     parts: &[
         include_str!("../../../wgsl/rays_triangle.wgsl"),
+        include_str!("../../../wgsl/rays_solid.wgsl"),
+        include_str!("../../../wgsl/rays_walk.wgsl"),
+        include_str!("../../../wgsl/rays_answers.wgsl"),
+    ],
+};
+
+const ANSWERS_HOLES: shader::Source = shader::Source {
+    name: "rays_answers",
+    parts: &[
+        photonstream_shading::wgsl::WRAP,
+        include_str!("../../../wgsl/rays_triangle.wgsl"),
+        include_str!("../../../wgsl/rays_holes.wgsl"),
         include_str!("../../../wgsl/rays_walk.wgsl"),
         include_str!("../../../wgsl/rays_answers.wgsl"),
     ],
 };
 
 /// Answers of the device, and the seconds that it took after a first round.
-fn device(gpu: &Gpu, scene: &Scene, queries: &[Ray], timed: bool) -> (Vec<bool>, f64) {
-    let mut rays = Rays::new(gpu);
-    rays.set_geometry(gpu, &scene.geometry).unwrap();
+pub(super) fn device(gpu: &Gpu, scene: &Scene, queries: &[Ray], timed: bool) -> (Vec<bool>, f64) {
+    let rays = rays_of(gpu, scene);
     let words: Vec<[f32; 8]> = queries
         .iter()
         .map(|r| {
@@ -31,19 +39,19 @@ fn device(gpu: &Gpu, scene: &Scene, queries: &[Ray], timed: bool) -> (Vec<bool>,
     let words = upload(gpu, "queries", bytemuck::cast_slice(&words));
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
     let answers = buffer(gpu, "answers", queries.len() as u64 * 4, usage);
-    let pipeline = computing(gpu, &ANSWERS, "answer");
+    let source = if rays.holes.is_some() { &ANSWERS_HOLES } else { &ANSWERS };
+    let pipeline = computing(gpu, source, "answer");
+    let holes = rays.holes.as_ref().map(|holes| (6, holes.words.as_entire_binding()));
     let groups = [
         bind(
             gpu,
             &pipeline.get_bind_group_layout(0),
-            &[0, 1, 2],
-            [words.as_entire_binding(), answers.as_entire_binding(), bounds.as_entire_binding()],
+            (0..).zip([words.as_entire_binding(), answers.as_entire_binding(), bounds.as_entire_binding()]),
         ),
         bind(
             gpu,
             &pipeline.get_bind_group_layout(1),
-            &[1, 2],
-            [rays.nodes.as_entire_binding(), rays.triangles.as_entire_binding()],
+            (1..).zip([rays.nodes.as_entire_binding(), rays.triangles.as_entire_binding()]).chain(holes),
         ),
     ];
     let run = || {
@@ -72,7 +80,7 @@ fn device(gpu: &Gpu, scene: &Scene, queries: &[Ray], timed: bool) -> (Vec<bool>,
 }
 
 /// Segments between points just off the scene's surfaces, by area; a run of `run` of them ends at the same point.
-fn segments(scene: &Scene, count: u32, run: u32) -> Vec<Ray> {
+pub(super) fn segments(scene: &Scene, count: u32, run: u32) -> Vec<Ray> {
     let targets = scattered_vsls(scene, 4_096);
     let (lo, hi) = scene.bvh.bounds();
     let offset = lo.abs().max(hi.abs()).max_element() * surface::RELATIVE_OFFSET;
