@@ -30,7 +30,7 @@ Examples:
 
 Environment:
   PHOTONSTREAM_SCENES  folder in which scene files' models are looked for
-  PHOTONSTREAM_CACHE   folder for references and for trees of large models, or \"off\"
+  PHOTONSTREAM_CACHE   folder for references and for what large models need, or \"off\"
                        [default: $XDG_CACHE_HOME/photonstream or ~/.cache/photonstream]
 
 Exit codes:

@@ -14,7 +14,6 @@ mod device;
 mod error;
 mod exit;
 mod follow;
-mod kept;
 mod log;
 mod output;
 mod owned;
@@ -35,7 +34,7 @@ use std::process::ExitCode;
 pub fn main() -> ExitCode {
     let program = cli::Program::parse();
     log::start(&program.global);
-    kept::keep_trees();
+    photonstream_scene::kept::use_user_cache();
     match commands::dispatch(program) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

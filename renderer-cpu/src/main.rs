@@ -18,5 +18,6 @@ struct Command {
 
 fn main() -> anyhow::Result<()> {
     tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).init();
+    photonstream_scene::kept::use_user_cache();
     Ok(program::run(&Command::parse().args, &mut CpuRenderer)?)
 }

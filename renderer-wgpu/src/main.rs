@@ -20,6 +20,7 @@ struct Command {
 
 fn main() -> anyhow::Result<()> {
     tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).init();
+    photonstream_scene::kept::use_user_cache();
     let Command { args, gpu } = Command::parse();
     Ok(program::run(&args, &mut gpu.renderer()?)?)
 }

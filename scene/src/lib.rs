@@ -13,6 +13,7 @@ mod edit;
 mod error;
 pub mod features;
 mod import;
+pub mod kept;
 mod model;
 mod picture;
 mod placement;

@@ -2,10 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use glam::Vec3;
-use photonstream_scene::{
-    Scene,
-    bvh::{Ray, TreeCache},
-};
+use photonstream_scene::{Scene, bvh::Ray, kept};
 use std::path::Path;
 
 #[test]
@@ -14,8 +11,8 @@ fn a_scene_finds_the_tree_of_its_large_object_again() {
     let folder = tempfile::tempdir().unwrap();
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/cornell-knot.toml");
     let without = Scene::load(&config).unwrap();
-    assert!(TreeCache::new(folder.path().join("trees")).use_in_this_process());
-    assert!(!TreeCache::new(folder.path().join("others")).use_in_this_process(), "a process has one");
+    assert!(kept::use_in_this_process(folder.path().to_owned()));
+    assert!(!kept::use_in_this_process(folder.path().join("others")), "a process has one");
     for round in 0..2 {
         let with = Scene::load(&config).unwrap();
         let files: Vec<_> = std::fs::read_dir(folder.path().join("trees")).unwrap().collect();

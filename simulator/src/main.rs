@@ -16,6 +16,7 @@ struct Program {
 fn main() -> ExitCode {
     let program = Program::parse();
     tracing_subscriber::fmt().with_writer(std::io::stderr).init();
+    photonstream_scene::kept::use_user_cache();
     match cli::run(&program.args) {
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {

@@ -11,14 +11,19 @@ use crate::{
     placement::Placement,
     vsl::{COMPATIBLE_COSINE, Surface, Vsl},
 };
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec3};
 use photonstream_scene::{Geometry, Scene};
 use photonstream_shading::{patch::MAX_CORNERS, surface};
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Largest offset of a corner that is read from a file, in edges: these are at most 10⁹ m, and squares have to fit f32.
+const MOST_OFFSET: f32 = 1e9;
+
 /// The polygon of a virtual surface light.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Patch {
     /// From the light to each corner, in units of the edges from the first vertex of its triangle to the second and third.
     corners: [[f32; 2]; MAX_CORNERS],
@@ -27,6 +32,15 @@ pub struct Patch {
 }
 
 impl Patch {
+    /// Whether it is one that [`of_voronoi_cells`] could have made, as far as a patch alone tells.
+    pub(crate) fn is_valid(&self) -> bool {
+        let count = self.count as usize;
+        let (used, unused) = self.corners.split_at(count.min(MAX_CORNERS));
+        (count == 0 || (3..=MAX_CORNERS).contains(&count))
+            && used.iter().flatten().all(|x| x.abs() <= MOST_OFFSET)
+            && unused.iter().flatten().all(|x| x.to_bits() == 0)
+    }
+
     /// The corners in the scene's space relative to the light, in m, counter-clockwise as the lit side sees them.
     pub fn corners_ws(&self, geometry: &Geometry, vsl: &Vsl) -> impl ExactSizeIterator<Item = Vec3> {
         let [a, b, c] = geometry.triangle(vsl.triangle);
@@ -105,7 +119,7 @@ fn share(piece: &[[f64; 2]]) -> f64 {
 }
 
 /// Points of a light that are kept before the hull of them replaces them.
-const MOST_POINTS: usize = 64;
+pub(crate) const MOST_POINTS: usize = 64;
 
 /// The plane of a light's triangle in its object's rest space, with the light in its origin.
 struct Plane {

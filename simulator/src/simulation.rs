@@ -7,7 +7,10 @@ use crate::{
     emitters::{Emitters, LightSlots},
     exposure,
     ledger::{Ledger, PATHS_PER_TASK},
-    owner::OwnerTable,
+    owner::{
+        OwnerTable,
+        kept::{self, OwnerCache},
+    },
     placement::Placement,
     tracer::{PathBatch, Tracer, Wave},
 };
@@ -38,11 +41,19 @@ impl Simulation {
         Self::new_unless(scene, &Cancel::default()).expect("invariant: nobody else can cancel it")
     }
 
-    /// [`Simulation::new`], or `None` soon after it was cancelled.
+    /// [`Simulation::new`], or `None` soon after it was cancelled. Who owns what is kept where the process keeps things
+    /// ([`photonstream_scene::kept`]).
     pub fn new_unless(scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
+        Self::made(scene, OwnerCache::of_this_process(), cancel)
+    }
+
+    fn made(scene: Arc<Scene>, cache: Option<&OwnerCache>, cancel: &Cancel) -> Option<Self> {
         let mut placement = Placement::new_unless(&scene, cancel)?;
-        let owners = Arc::new(OwnerTable::new_unless(&scene, &placement, cancel)?);
-        placement.measure_areas(&scene, &owners);
+        let owners = match cache {
+            Some(cache) => cache.owners(&scene, &mut placement, cancel)?,
+            None => kept::computed(&scene, &mut placement, cancel)?,
+        };
+        let owners = Arc::new(owners);
         let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
         let exposed = exposure::shares(&scene, &placement).into();
@@ -90,6 +101,11 @@ impl Simulation {
 
     /// [`Simulation::reloaded`], or `None` soon after it was cancelled.
     pub fn reloaded_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
+        Some(Self::made(scene, None, cancel)?.with_split_of(self))
+    }
+
+    /// [`Simulation::reloaded_unless`], with who owns what kept as by [`Simulation::new_unless`]: for scenes that may come again.
+    pub(crate) fn reloaded_and_kept_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
         Some(Self::new_unless(scene, cancel)?.with_split_of(self))
     }
 

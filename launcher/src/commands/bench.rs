@@ -5,7 +5,6 @@ use super::render::remove_channel;
 use crate::{
     cli::Global,
     error::LauncherError,
-    kept::user_cache,
     output,
     progress::{Share, Spinner},
     signals::Listener,
@@ -14,7 +13,7 @@ use photonstream_evaluation::{
     Observer,
     paper_tables::{PaperOptions, PaperTables},
 };
-use photonstream_scene::SceneConfig;
+use photonstream_scene::{SceneConfig, kept::user_cache};
 use photonstream_simulator::{
     bench::{self, BenchOptions, DynamicOptions},
     cli::Overrides,

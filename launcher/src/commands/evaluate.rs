@@ -2,11 +2,10 @@
 
 #[cfg(feature = "wgpu")]
 use crate::device::GpuDevice;
-use crate::{
-    cli::Global, error::LauncherError, kept::user_cache, output, progress::Share, signals::Listener,
-};
+use crate::{cli::Global, error::LauncherError, output, progress::Share, signals::Listener};
 use photonstream_evaluation::{Observer, Options, device::Offered, evaluate, plan::Effort};
 use photonstream_renderer::cli::Size;
+use photonstream_scene::kept::user_cache;
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -111,6 +111,7 @@ fn renderer(root: &Path, out: &Path, arguments: &[&str]) -> Child {
         .arg(out)
         .args(arguments)
         .env("PHOTONSTREAM_RUNTIME_DIR", root)
+        .env("PHOTONSTREAM_CACHE", "off")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

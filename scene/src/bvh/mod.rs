@@ -53,7 +53,7 @@ mod lanes_x86;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86_512;
 mod node;
-mod pages;
+pub(crate) mod pages;
 mod part;
 mod ray_frame;
 mod refit;
@@ -68,7 +68,7 @@ mod tests;
 
 use glam::Vec3;
 
-pub use cache::TreeCache;
+pub(crate) use cache::TreeCache;
 pub use error::BvhError;
 pub(crate) use holes::Holes;
 pub use part::Bvh;

@@ -16,9 +16,16 @@ const LARGE_PAGE: usize = 2 << 20;
 
 /// A list that does not grow.
 #[derive(Debug)]
-pub(super) enum Pages<T> {
+pub enum Pages<T> {
+    /// In ordinary memory.
     Short(Vec<T>),
-    Long { memory: MmapMut, len: usize },
+    /// In large pages.
+    Long {
+        /// The pages.
+        memory: MmapMut,
+        /// Number of items.
+        len: usize,
+    },
 }
 
 impl<T: Pod> From<Vec<T>> for Pages<T> {
@@ -37,7 +44,7 @@ impl<T: Pod> Pages<T> {
     ///
     /// # Errors
     /// Those of `fill`.
-    pub(super) fn filled<E>(len: usize, fill: impl FnOnce(&mut [T]) -> Result<(), E>) -> Result<Self, E> {
+    pub(crate) fn filled<E>(len: usize, fill: impl FnOnce(&mut [T]) -> Result<(), E>) -> Result<Self, E> {
         let bytes = len * size_of::<T>();
         if let Some(mut memory) = mapped(bytes) {
             fill(bytemuck::cast_slice_mut(&mut memory[..bytes]))?;

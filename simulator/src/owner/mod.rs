@@ -9,6 +9,8 @@
 //! for a cell in one line of the cache, and the least of four at once, without a branch to mispredict.
 
 mod build;
+mod choices;
+pub(crate) mod kept;
 mod pieces;
 
 use crate::vsl::VslId;

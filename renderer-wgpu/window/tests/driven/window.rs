@@ -46,6 +46,7 @@ impl<'a> Window<'a> {
             .env_remove("WAYLAND_DISPLAY")
             .env("RUST_LOG", "info,photonstream_window=debug")
             .env("NO_COLOR", "1")
+            .env("PHOTONSTREAM_CACHE", "off")
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();

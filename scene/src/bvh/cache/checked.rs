@@ -11,7 +11,8 @@ use super::super::part::Bvh;
 use super::super::refit::surface_cost;
 use super::super::triangle::{Packet, is_solid};
 use super::super::validate::check_part;
-use super::file::{Found, renumber};
+use super::renumber;
+use crate::kept::Found;
 
 /// Packets checked at a time.
 const BATCH: usize = 4096;
@@ -19,12 +20,12 @@ const BATCH: usize = 4096;
 /// The tree, if every triangle of `range` that can be hit is in it once, where its corners are now, all boxes enclose what is
 /// below them, the depth is bounded, and children come after their parents. All else is computed, not read.
 pub(super) fn checked(
-    found: Found,
+    found: Found<Node, Packet>,
     vertices: &[Vec3],
     triangles: &[[u32; 3]],
     range: &Range<u32>,
 ) -> Option<Bvh> {
-    let Found { nodes, mut packets, root } = found;
+    let Found { first: nodes, second: mut packets, number: root } = found;
     let corners = |id: u32| -> Option<[Vec3; 3]> {
         let [a, b, c] = *triangles.get(id as usize)?;
         Some([*vertices.get(a as usize)?, *vertices.get(b as usize)?, *vertices.get(c as usize)?])

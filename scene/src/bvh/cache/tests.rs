@@ -9,10 +9,12 @@ use proptest::prelude::*;
 use super::super::Bvh;
 use super::super::SceneBvh;
 use super::super::tests::shapes::{Mesh, Random, soup};
-use super::{TreeCache, file, folder, key};
+use super::{TreeCache, key};
 
 /// Triangles of the test parts: enough for several levels.
 const TRIANGLES: u32 = 600;
+/// What a file has before its lists.
+const HEADER_BYTES: usize = 104;
 /// Where the test part begins, so that numbers in files are not those of the scene.
 const FIRST: u32 = 50;
 
@@ -50,7 +52,8 @@ fn bits(tree: &Bvh) -> Vec<u8> {
 }
 
 fn files(cache: &TreeCache) -> Vec<PathBuf> {
-    let mut files: Vec<_> = fs::read_dir(&cache.folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut files: Vec<_> =
+        fs::read_dir(cache.files.folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     files
 }
@@ -59,7 +62,8 @@ fn files(cache: &TreeCache) -> Vec<PathBuf> {
 fn is_taken(cache: &TreeCache, (vertices, triangles): &Mesh) -> bool {
     let range = FIRST..FIRST + TRIANGLES;
     let key = key::key(vertices, triangles, &range);
-    file::read(&cache.path(&key), &key, range.len())
+    cache
+        .find(&key, range.len())
         .and_then(|found| super::checked::checked(found, vertices, triangles, &range))
         .is_some()
 }
@@ -149,7 +153,7 @@ fn is_rebuilt(
 fn every_flipped_byte_of_the_header_and_other_files_are_noticed() {
     let kept = kept();
     let good = kept.3.clone();
-    for at in 0..file::length(0, 0) as usize {
+    for at in 0..HEADER_BYTES {
         let mut bytes = good.clone();
         bytes[at] ^= 1 << (at % 8);
         is_rebuilt(&bytes, &kept);
@@ -181,7 +185,7 @@ proptest! {
         root in prop_oneof![9 => Just(0u32), 1 => any::<u32>()],
         seed: u64,
     ) {
-        let (_folder, cache, path, _, mesh) = kept();
+        let (_folder, cache, _, _, mesh) = kept();
         let mut forged = built(&mesh);
         forged.root = root;
         for (at, value, kind) in changes {
@@ -201,7 +205,7 @@ proptest! {
         }
         let range = FIRST..FIRST + TRIANGLES;
         let key = key::key(&mesh.0, &mesh.1, &range);
-        folder::replace(&path, |out| file::write(out, &key, &forged, FIRST)).unwrap();
+        cache.keep(&key, &forged, FIRST);
         let taken = is_taken(&cache, &mesh);
         let tree = SceneBvh::build_cached(&mesh.0, &mesh.1, std::slice::from_ref(&range), Some(&cache));
         let whole = SceneBvh::build(&mesh.0, &mesh.1, &[range]);
@@ -241,7 +245,7 @@ fn the_files_used_least_recently_make_room() {
     let meshes: Vec<Mesh> = (10..15).map(mesh).collect();
     let used = |cache: &TreeCache, mesh: &Mesh, seconds: u64| {
         tree(cache, mesh);
-        let path = cache.path(&key::key(&mesh.0, &mesh.1, &(FIRST..FIRST + TRIANGLES)));
+        let path = cache.files.path(&key::key(&mesh.0, &mesh.1, &(FIRST..FIRST + TRIANGLES)));
         let then = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000 + seconds);
         fs::File::open(path).unwrap().set_modified(then).unwrap();
     };
@@ -249,18 +253,18 @@ fn the_files_used_least_recently_make_room() {
         used(&cache, mesh, seconds);
     }
     let sizes = files(&cache).iter().map(|path| fs::metadata(path).unwrap().len()).collect::<Vec<_>>();
-    cache.limit_bytes = sizes.iter().sum::<u64>() + sizes.iter().min().unwrap() / 2;
-    fs::write(cache.folder.join("not ours"), vec![0; 9_000_000]).unwrap();
+    cache.files.limit_bytes = sizes.iter().sum::<u64>() + sizes.iter().min().unwrap() / 2;
+    fs::write(cache.files.folder().join("not ours"), vec![0; 9_000_000]).unwrap();
     // Reading makes it the newest of all.
     tree(&cache, &meshes[0]);
     tree(&cache, &meshes[3]);
     let left = |cache: &TreeCache| meshes.iter().map(|mesh| is_taken(cache, mesh)).collect::<Vec<_>>();
     assert_eq!(left(&cache), [true, false, true, true, false]);
     // A tree that would not fit alone is not written at all.
-    cache.limit_bytes = 1_000;
+    cache.files.limit_bytes = 1_000;
     tree(&cache, &meshes[4]);
     assert_eq!(left(&cache), [true, false, true, true, false]);
-    assert!(cache.folder.join("not ours").exists());
+    assert!(cache.files.folder().join("not ours").exists());
 }
 
 #[test]
@@ -291,7 +295,7 @@ fn many_at_once_leave_whole_files() {
                 for round in 0..15 {
                     let (mesh, expected) = &meshes[(thread + round) % 3];
                     assert_eq!(&bits(&tree(&cache, mesh)), expected);
-                    let path = cache.path(&key::key(&mesh.0, &mesh.1, &(FIRST..FIRST + TRIANGLES)));
+                    let path = cache.files.path(&key::key(&mesh.0, &mesh.1, &(FIRST..FIRST + TRIANGLES)));
                     match (thread + 3 * round) % 7 {
                         0 => drop(fs::remove_file(path)),
                         1 => drop(fs::write(path, "cut")),

@@ -148,9 +148,10 @@ impl Director {
             (wanted.scene, wanted.animated_s) = (scene, Some(self.clock.time_s()));
         }
         let scene = Arc::new(wanted.scene.clone());
+        let is_kept = wanted.is_config;
         let cancel = self.placements.begin(wanted);
         // A placer that is gone says so by another way.
-        let _ = self.to_placer.send(Order { base: self.simulation.clone(), scene, cancel });
+        let _ = self.to_placer.send(Order { base: self.simulation.clone(), scene, is_kept, cancel });
     }
 
     /// Goes on with what the placer has made ready, if it is still wanted.

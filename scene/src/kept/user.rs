@@ -1,6 +1,5 @@
-//! Turns the environment into the folder that keeps what took long to compute, and the trees of scenes among it.
+//! Turns the environment into the folder of the user that keeps what took long to compute.
 
-use photonstream_scene::bvh::TreeCache;
 use std::{ffi::OsString, path::PathBuf};
 
 /// Names another folder, or is `off`.
@@ -8,15 +7,8 @@ const VARIABLE: &str = "PHOTONSTREAM_CACHE";
 
 /// `$PHOTONSTREAM_CACHE`, else `$XDG_CACHE_HOME/photonstream`, else `~/.cache/photonstream`; `None` where nothing is to
 /// be kept, or nowhere.
-pub(crate) fn user_cache() -> Option<PathBuf> {
+pub fn user_cache() -> Option<PathBuf> {
     folder(|name| std::env::var_os(name))
-}
-
-/// Lets scenes that this process loads keep the trees of large parts.
-pub(crate) fn keep_trees() {
-    if let Some(folder) = user_cache() {
-        TreeCache::new(folder.join("trees")).use_in_this_process();
-    }
 }
 
 fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {

@@ -1,4 +1,4 @@
-//! Turns trees to be kept into files of a folder that is shared by processes and has an upper size.
+//! Turns contents to be kept into files of a folder that is shared by processes and has an upper size.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -6,8 +6,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// Of whole files.
-pub(super) const EXTENSION: &str = "tree";
 /// Of files that are being written.
 const UNFINISHED: &str = "unfinished";
 /// After this time nobody writes to an unfinished file any more.
@@ -44,25 +42,25 @@ pub(super) fn mark_used(path: &Path) {
     let _ = File::open(path).and_then(|file| file.set_modified(SystemTime::now()));
 }
 
-/// Removes the files that were used least recently until the others have at most `limit` bytes, and abandoned ones.
-pub(super) fn make_room(folder: &Path, limit: u64) -> io::Result<()> {
-    let mut trees = Vec::new();
+/// Removes the files of an extension that were used least recently until the others have at most `limit` bytes, and abandoned ones.
+pub(super) fn make_room(folder: &Path, extension: &str, limit: u64) -> io::Result<()> {
+    let mut files = Vec::new();
     for entry in fs::read_dir(folder)? {
         // What another process removed meanwhile is gone; what is not ours stays.
         let Ok(entry) = entry else { continue };
         let (Ok(about), path) = (entry.metadata(), entry.path()) else { continue };
         let used = about.modified().unwrap_or(SystemTime::UNIX_EPOCH);
         match path.extension().and_then(|extension| extension.to_str()) {
-            Some(EXTENSION) if about.is_file() => trees.push((used, about.len(), path)),
+            Some(other) if other == extension && about.is_file() => files.push((used, about.len(), path)),
             Some(UNFINISHED) if used.elapsed().is_ok_and(|age| age > ABANDONED) => {
                 let _ = fs::remove_file(&path);
             }
             _ => {}
         }
     }
-    trees.sort();
-    let mut bytes: u64 = trees.iter().map(|(_, bytes, _)| bytes).sum();
-    for (_, size, path) in trees {
+    files.sort();
+    let mut bytes: u64 = files.iter().map(|(_, bytes, _)| bytes).sum();
+    for (_, size, path) in files {
         if bytes <= limit {
             break;
         }
