@@ -142,7 +142,7 @@ fn what_is_saved_is_simulated() {
 /// last valid text wins.
 #[test]
 fn a_storm_of_saves_ends_in_the_last_valid_text() {
-    let mut edited = start("storm");
+    let mut edited = start("saves");
     let path = edited.path.clone();
     let saver = std::thread::spawn(move || {
         for save in 0..300 {
