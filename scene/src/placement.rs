@@ -37,6 +37,11 @@ impl Placement {
     pub(crate) fn apply(&self, point: DVec3) -> DVec3 {
         self.rotation * (self.scale * point) + self.position
     }
+
+    /// The unit vector of a direction of the object's own coordinates in those of the config; 0 where that leads nowhere.
+    pub(crate) fn turn(&self, direction: DVec3) -> DVec3 {
+        (self.rotation * (self.scale * direction)).normalize_or_zero()
+    }
 }
 
 /// Intrinsic XYZ: about x, then about the turned y, then about the twice turned z; R = Rx Ry Rz.

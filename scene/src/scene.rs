@@ -7,12 +7,13 @@ use crate::{
     config::LightConfig,
     features::Features,
     picture::Texture,
+    placement::Placement,
     pose::{Pose, RestMesh},
     settings::{RenderSettings, StreamingSettings},
 };
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
 use photonstream_shading::{Camera, Light, light::Bounds, surface};
-use std::{ops::Range, sync::Arc};
+use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
 /// Index of an object in [`Scene::objects`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -74,6 +75,10 @@ pub struct Scene {
     /// The mesh of each object, to be posed anew.
     pub(crate) rest_meshes: Arc<[RestMesh]>,
     /// How each object stands.
+    /// How each import that has several objects stands.
+    pub(crate) imports: BTreeMap<String, Placement>,
+    /// Lights of imports that stand still in these.
+    pub(crate) imported_lights: Arc<[StillLight]>,
     pub(crate) poses: Vec<Pose>,
 }
 
@@ -171,6 +176,18 @@ pub struct SceneLight {
     pub(crate) written: Option<LightConfig>,
     /// What of `object` emits, and how much.
     pub(crate) face: Option<(Emitting, Strength)>,
+}
+
+/// A light of a file on a node that its animation does not move.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct StillLight {
+    /// Name of the object that imports the file.
+    pub(crate) import: String,
+    pub(crate) light: String,
+    /// In the import's own coordinates, m; `None` where it has none.
+    pub(crate) position: Option<DVec3>,
+    /// The same, of any length but 0.
+    pub(crate) direction: Option<DVec3>,
 }
 
 /// All triangles of a scene; what does not change when objects move at their size is shared by all versions of the scene.

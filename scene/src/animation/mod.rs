@@ -9,7 +9,6 @@ use crate::{
     config::{AnimatedProperty, Document, Field},
     edit::{SceneEdit, Values},
     error::SceneError,
-    placement::{Placement, rotation},
     scene::{Object, SceneLight},
 };
 pub(crate) use read::read;
@@ -108,23 +107,12 @@ impl Animation {
         check_time(time_s)?;
         edit.all_or_nothing(|edit| {
             self.targets.iter().try_for_each(|target| target.apply(time_s, edit))?;
-            self.rigs.iter().try_for_each(|rig| rig.apply(time_s, &self.placement(rig, time_s), edit))
+            // Where the import stands by now, dragged or animated, its nodes move.
+            self.rigs.iter().try_for_each(|rig| {
+                let placement = edit.import(&rig.import).expect("invariant: what a file moves is imported");
+                rig.apply(time_s, &placement, edit)
+            })
         })
-    }
-
-    /// How the import of a rig stands: what a scene file animates of it counts.
-    fn placement(&self, rig: &Rig, time_s: f64) -> Placement {
-        let mut placement = rig.placement;
-        let of_import = |target: &&Target| target.kind == Kind::Object && target.name == rig.import;
-        for (property, track) in self.targets.iter().filter(of_import).flat_map(|target| &target.tracks) {
-            match property {
-                AnimatedProperty::Position => placement.position = track.at(time_s),
-                AnimatedProperty::Rotation => placement.rotation = rotation(track.at(time_s)),
-                AnimatedProperty::Scale => placement.scale = track.at(time_s),
-                _ => {}
-            }
-        }
-        placement
     }
 
     /// The numbers of objects and of lights that move; lights move with the objects that show them.
@@ -150,11 +138,14 @@ impl Animation {
                     || self.targets.iter().any(|t| moves(t, true) && object.is_called(&t.name))
             })
             .collect();
+        let is_of =
+            |light: &str, import: &str| light.strip_prefix(import).is_some_and(|rest| rest.starts_with('/'));
         let light_moves = |light: &SceneLight| match light.object {
             Some(object) => moving[object.0 as usize],
             None => {
                 rides(&light.name, false)
                     || self.targets.iter().any(|t| moves(t, false) && t.name == light.name)
+                    || self.targets.iter().any(|t| moves(t, true) && is_of(&light.name, &t.name))
             }
         };
         let count = |moving: &mut dyn Iterator<Item = bool>| moving.filter(|moves| *moves).count() as u32;

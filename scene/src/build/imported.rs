@@ -186,6 +186,7 @@ pub(super) fn read(
         let placed = PlacedCamera::new(camera, &placement, motion.as_ref());
         context.inputs.cameras.insert(name, placed);
     }
+    context.inputs.imports.insert(name.to_owned(), placement);
     if let Some(motion) = motion {
         motion.finish(name, context.inputs);
     }

@@ -7,6 +7,7 @@ use crate::{
     error::{SceneError, nearest},
     import::{ImportedLight, ImportedLightKind},
     placement::Placement,
+    scene::StillLight,
 };
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -71,8 +72,14 @@ pub(super) fn add(
     let (position, direction) = match motion.and_then(|motion| motion.carry(&node, &name, has)) {
         Some(world) => light_at(&world, &placement),
         None => {
-            let direction = placement.rotation * (placement.scale * direction);
-            (placement.apply(position), direction.normalize_or_zero())
+            let still = StillLight {
+                import: import.to_owned(),
+                light: name.clone(),
+                position: has.0.then_some(position),
+                direction: has.1.then_some(direction),
+            };
+            inputs.still_lights.push(still);
+            (placement.apply(position), placement.turn(direction))
         }
     };
     let (position_m, direction) = (position.into(), direction.into());

@@ -89,9 +89,9 @@ impl Motion {
 
     /// Hands over what moves later.
     pub(super) fn finish(self, import: &str, inputs: &mut Inputs<'_>) {
-        let Self { skeleton, import: placement, is_held, riders, .. } = self;
+        let Self { skeleton, is_held, riders, .. } = self;
         if !(is_held || riders.is_empty()) {
-            inputs.rigs.push(Rig { import: import.to_owned(), placement, skeleton, riders });
+            inputs.rigs.push(Rig { import: import.to_owned(), skeleton, riders });
         }
     }
 }

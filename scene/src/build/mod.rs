@@ -22,7 +22,8 @@ use crate::{
     error::SceneError,
     features::Features,
     import::AssetRoots,
-    scene::{LightId, ObjectId, Scene, SceneLight},
+    placement::Placement,
+    scene::{LightId, ObjectId, Scene, SceneLight, StillLight},
     texturing,
 };
 use glam::DVec3;
@@ -86,6 +87,8 @@ impl SceneConfig {
             sky_content: None,
             files: Vec::new(),
             rigs: Vec::new(),
+            imports: BTreeMap::new(),
+            still_lights: Vec::new(),
             cameras: BTreeMap::new(),
         };
         let mut notices = Vec::new();
@@ -147,6 +150,8 @@ impl SceneConfig {
             animation: Arc::new(animation),
             files: inputs.files.into(),
             rest_meshes: rest_meshes.into(),
+            imports: inputs.imports,
+            imported_lights: inputs.still_lights.into(),
             poses,
         };
         let vsl_area_m2 = scene.reflecting_area_m2() / scene.streaming.vsls.max(1) as f64;
@@ -161,6 +166,9 @@ struct Inputs<'a> {
     files: Vec<std::path::PathBuf>,
     /// What moves the parts of imports.
     rigs: Vec<Rig>,
+    /// How each import stands.
+    imports: BTreeMap<String, Placement>,
+    still_lights: Vec<StillLight>,
     /// Cameras of imported files, by the names of object and node.
     cameras: BTreeMap<String, imported_cameras::PlacedCamera>,
     parts: BTreeMap<String, Part<'a>>,

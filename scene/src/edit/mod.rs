@@ -115,7 +115,8 @@ impl SceneEdit {
     }
 
     /// Moves the object called `name`, or all objects that the import `name` has made, by the keys `position_m`,
-    /// `rotation_deg` and `scale` of a config; what is not given stays. Positions are in the config's coordinates.
+    /// `rotation_deg` and `scale` of a config; what is not given stays. Positions are in the config's coordinates. With an
+    /// import go its lights: to where its file has them.
     ///
     /// A scale changes the object at rest: [`crate::Geometry::rest_vertices`], and [`crate::Geometry::triangles`] where
     /// it turns a mesh inside out, are others then.
@@ -124,6 +125,11 @@ impl SceneEdit {
     /// If there is no such object or key, or a value is not valid; nothing is changed then.
     pub fn move_object(&mut self, name: &str, values: &Values) -> Result<Vec<ObjectId>, SceneError> {
         object::set(self, name, values)
+    }
+
+    /// How an import stands, edits included.
+    pub(crate) fn import(&self, name: &str) -> Option<Placement> {
+        self.scene.imports.get(name).copied()
     }
 
     /// Puts the object called `name` where `placement` says, in the config's coordinates.
@@ -204,10 +210,10 @@ impl SceneEdit {
         &mut self,
         edits: impl FnOnce(&mut Self) -> Result<(), SceneError>,
     ) -> Result<(), SceneError> {
-        let before = (self.scene.lights.clone(), self.poses.clone());
+        let before = (self.scene.lights.clone(), self.scene.imports.clone(), self.poses.clone());
         let result = edits(self);
         if result.is_err() {
-            (self.scene.lights, self.poses) = before;
+            (self.scene.lights, self.scene.imports, self.poses) = before;
         }
         result
     }

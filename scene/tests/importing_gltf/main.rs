@@ -8,5 +8,6 @@ mod colours;
 mod files;
 mod geometry;
 mod parts;
+mod riding;
 mod surfaces;
 mod textures;

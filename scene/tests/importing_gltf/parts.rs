@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::f32::consts::PI;
 
 /// Three squares: two of `paint`, one of which has an emitting part, and a lamp on a node without a mesh.
-fn squares() -> Value {
+pub(super) fn squares() -> Value {
     let primitive =
         |material: u32| json!({ "attributes": { "POSITION": 0 }, "indices": 1, "material": material });
     let mut file = with(&[

@@ -16,8 +16,6 @@ use std::sync::Arc;
 pub(crate) struct Rig {
     /// Name of the object that imports the file.
     pub(crate) import: String,
-    /// How the import stands where nothing else moves it.
-    pub(crate) placement: Placement,
     pub(crate) skeleton: Skeleton,
     pub(crate) riders: Vec<Rider>,
 }
