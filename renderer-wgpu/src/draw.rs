@@ -119,7 +119,7 @@ impl Renderer {
             let with_maps = view.shadows == Shadows::Maps;
             let table = LightTable::new(
                 &scene.lights,
-                scene.bounds,
+                (scene.bounds, scene.extent),
                 view.light_samples,
                 view.shadows,
                 // Triangles with holes are not told by their names alone.

@@ -32,6 +32,11 @@ pub(crate) const SHADOW_NORMAL_TEXELS: f32 = 2.0;
 /// neighbours of a fine curved surface bulge over each other.
 pub(crate) const COVERED_TEXELS: f32 = 1.0;
 
+/// Texels by which a surface may lie behind what a sky's beam sees, and the share of its own change of depth within a texel: for
+/// normals that are bent, and surfaces that are curved.
+pub(crate) const BEAM_BIAS_TEXELS: f32 = 0.25;
+pub(crate) const BEAM_SLOPE_TOLERANCE: f32 = 0.25;
+
 /// Stands for the layer of a view whose map does not name triangles.
 pub(crate) const NO_LAYER: u32 = u32::MAX;
 
@@ -85,6 +90,8 @@ pub(crate) fn constants() -> String {
     float("STEEP_PIXELS", STEEP_PIXELS);
     float("SHADOW_NORMAL_TEXELS", SHADOW_NORMAL_TEXELS);
     float("COVERED_TEXELS", COVERED_TEXELS);
+    float("BEAM_BIAS_TEXELS", BEAM_BIAS_TEXELS);
+    float("BEAM_SLOPE_TOLERANCE", BEAM_SLOPE_TOLERANCE);
     float("COMPATIBLE_COS", photonstream_renderer::owner::COMPATIBLE_COS);
     float("EPSILON_OF_ONE", f32::EPSILON);
     float("SQRT_3", 3f32.sqrt());

@@ -54,6 +54,8 @@ pub(crate) struct OnDevice {
     pub(crate) textures: Option<Textures>,
     pub(crate) lights: Vec<SceneLight>,
     pub(crate) bounds: Bounds,
+    /// Lowest and highest corner of the box around the scene; both the origin in an empty one.
+    pub(crate) extent: [Vec3; 2],
     pub(crate) features: Features,
     pub(crate) albedo_max: f32,
     pub(crate) magnitude: f32,
@@ -142,6 +144,7 @@ impl Renderer {
             textures,
             lights: scene.lights.clone(),
             bounds: scene.bounds,
+            extent: if lo.is_finite() && hi.is_finite() { [lo, hi] } else { [Vec3::ZERO; 2] },
             features: scene.features.clone(),
             albedo_max: scene.albedo_max(),
             magnitude,

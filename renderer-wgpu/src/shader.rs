@@ -18,6 +18,7 @@ const VSL_PATCH: &str = include_str!("../wgsl/vsl_patch.wgsl");
 const VSL_MAP: &str = include_str!("../wgsl/vsl_map.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
+const SHADOW_BEAM: &str = include_str!("../wgsl/shadow_beam.wgsl");
 const SHADOW_NAMED: &str = include_str!("../wgsl/shadow_named.wgsl");
 
 const RAYS_TRIANGLE: &str = include_str!("../wgsl/rays_triangle.wgsl");
@@ -46,7 +47,7 @@ sources! {
     ];
     SHADOW_MAP = "shadow_map" [];
     SHADOW_MAP_HOLES = "shadow_map_holes" [wgsl::WRAP, wgsl::TEXTURE];
-    DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_NAMED];
+    DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_BEAM, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     TILED = "tiled" [

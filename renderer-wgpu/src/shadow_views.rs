@@ -1,19 +1,21 @@
 //! Turns lights into the table that shaders read, and into the views from which their shadow maps are drawn.
 
+mod sky;
+
 use crate::{
     Shadows,
     layout::{AREA_FACES, LightUniform, MAP_SEED, NO_LAYER, ShadowView},
 };
-use core::f32::consts::PI;
 use glam::{Mat4, Vec3, Vec4};
 use photonstream_scene::SceneLight;
 use photonstream_shading::{
-    LightShape, Sky, basis,
+    LightShape, basis,
     light::{Bounds, EmissiveMesh},
     sobol::Sequence,
     surface::RELATIVE_OFFSET,
     wgsl,
 };
+use sky::{SKY_POINTS, fitted_view, sky_suns};
 
 /// Most shadow maps of a scene: layers of one texture.
 pub(crate) const MAX_MAPS: u32 = 256;
@@ -32,12 +34,12 @@ pub(crate) struct LightTable {
 }
 
 impl LightTable {
-    /// The table of `lights`; area lights have maps around up to `points` of their points, a sky those of up to four times as
+    /// The table of `lights` in a scene within `bounds` and a box of the corners `extent`; area lights have maps around up to `points` of their points, a sky those of up to four times as
     /// many directions, which are others for each `sample`; the maps of others name triangles where `maps_are_named`. For
     /// `shadows` by rays, emitting meshes have all their triangles, else as many points as an area light.
     pub(crate) fn new(
         lights: &[SceneLight],
-        bounds: Bounds,
+        (bounds, extent): (Bounds, [Vec3; 2]),
         points: u32,
         shadows: Shadows,
         maps_are_named: bool,
@@ -91,7 +93,7 @@ impl LightTable {
                         part.first_map = table.views.len() as u32;
                         if shape.sky().is_some() {
                             let direction = Vec3::from(part.direction);
-                            table.views.push(beam_view(direction, bounds, table.resolution));
+                            table.views.push(fitted_view(direction, extent, table.resolution));
                         } else {
                             table.views.extend(emitter_views(part, bounds, table.resolution));
                         }
@@ -117,22 +119,6 @@ impl LightTable {
         }
         table
     }
-}
-
-/// Directions of a sky for each point of an area light.
-const SKY_POINTS: u32 = 4;
-
-/// Directions drawn by a sky's importance as parallel lights without maps, of `count` those with the number `sample`.
-fn sky_suns(sky: &Sky, power: Vec3, index: usize, count: u32, sample: u32) -> Vec<LightUniform> {
-    let sequence = Sequence::new(MAP_SEED.into(), index as u32);
-    let sun = |k: u32| {
-        let u = sequence.sample(u64::from(sample) * u64::from(count) + u64::from(k)).next_2d();
-        let drawn = sky.sample(u);
-        let irradiance = drawn.relative * (4.0 * PI / sky.importance(drawn.relative) / count as f32);
-        let shape = LightShape::Directional { direction: -drawn.wi };
-        light_uniform(&shape, if irradiance.is_finite() { power * irradiance } else { Vec3::ZERO })
-    };
-    (0..count).map(sun).collect()
 }
 
 /// Triangles of a mesh that rays choose among; of more, so many that are drawn by their areas stand for all.
@@ -318,10 +304,15 @@ fn perspective_view(frame: &Frame, tan: f32, near: f32, resolution: u32) -> Shad
 }
 
 fn parallel_view(frame: &Frame, radius: f32, resolution: u32) -> ShadowView {
-    let row = |v: Vec3| v.extend(-v.dot(frame.position)) / radius;
-    let depth = Vec4::new(0.0, 0.0, 0.0, 0.5) - row(frame.forward) * 0.5;
-    let rows = [row(frame.right), row(frame.up), depth, Vec4::new(0.0, 0.0, 0.0, 1.0)];
-    view(rows, 2.0 * radius / resolution as f32, true)
+    box_view(frame, [radius; 3], resolution)
+}
+
+/// A parallel view that reaches so far to each side, up and down, and ahead and back.
+fn box_view(frame: &Frame, [x, y, z]: [f32; 3], resolution: u32) -> ShadowView {
+    let row = |v: Vec3, reach: f32| v.extend(-v.dot(frame.position)) / reach;
+    let depth = Vec4::new(0.0, 0.0, 0.0, 0.5) - row(frame.forward, z) * 0.5;
+    let rows = [row(frame.right, x), row(frame.up, y), depth, Vec4::new(0.0, 0.0, 0.0, 1.0)];
+    view(rows, 2.0 * x.max(y) / resolution as f32, true)
 }
 
 fn view(rows: [Vec4; 4], texel: f32, parallel: bool) -> ShadowView {
@@ -339,7 +330,7 @@ fn view(rows: [Vec4; 4], texel: f32, parallel: bool) -> ShadowView {
 mod tests {
     use super::*;
 
-    fn seen(view: &ShadowView, p: Vec3) -> Vec3 {
+    pub(super) fn seen(view: &ShadowView, p: Vec3) -> Vec3 {
         let clip = Mat4::from_cols_array_2d(&view.clip_from_world) * p.extend(1.0);
         clip.truncate() / clip.w
     }

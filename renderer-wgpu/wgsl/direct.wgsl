@@ -82,7 +82,7 @@ fn arriving_from_sky(sun: Light, surface: Surface) -> vec3f {
     }
     var lit = 1.0;
     if SHADOWS && sun.maps > 0u {
-        lit = shadow_lit(sun.first_map, surface.position, surface.normal, cos_theta);
+        lit = shadow_beam_lit(sun.first_map, surface.position, surface.normal);
     }
     return sun.power * (cos_theta * lit);
 }

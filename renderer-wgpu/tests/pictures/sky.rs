@@ -107,8 +107,9 @@ fn direct_error(
 }
 
 /// With shadow maps a sky is 64 directions with the default 16 samples: its direct light against 1 024 directions for each pixel of
-/// the CPU (own noise below 1 %) is off by at most 8 % rel. RMSE, without shadows by far more. Measured: 4.6 % under
-/// the gradient and 5.6 % under the map, the mean −0.7 % and −0.4 %; 26 % and 29 % without shadows.
+/// the CPU (own noise below 1 %) is off by at most 5 % rel. RMSE, without shadows by far more, and the mean of eight camera samples
+/// by at most 2 %. Measured: 3.9 % under the gradient and 2.2 % under the map, their means of eight 1.0 % and 1.2 %; 26 % and 29 %
+/// without shadows.
 #[test]
 fn a_sky_by_shadow_maps_is_near_the_cpus() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,7 +122,7 @@ fn a_sky_by_shadow_maps_is_near_the_cpus() {
             let view = View { light_samples: samples, ..view };
             let (error, bias) = direct_error(&mut renderer, &view, &exact, &behind);
             println!("{name}, {} maps: rel. RMSE {error:.4}, mean {bias:+.4}", 4 * samples);
-            assert!(samples < 16 || error < 0.08, "{name}: {error}");
+            assert!(samples < 16 || error < 0.05, "{name}: {error}");
         }
         let (bare, _) =
             direct_error(&mut renderer, &View { shadows: Shadows::None, ..view }, &exact, &behind);
@@ -136,6 +137,6 @@ fn a_sky_by_shadow_maps_is_near_the_cpus() {
         let (one, _) = direct_error(&mut renderer, &view, &exact, &behind);
         let mean = rel_rmse(&sum, &exact, |i| behind[i].is_none());
         println!("{name}, mean of 8 samples: {mean:.4}");
-        assert!(mean < one, "{name}: {mean} after 8 samples, {one} after one");
+        assert!(mean < one && mean < 0.02, "{name}: {mean} after 8 samples, {one} after one");
     }
 }
