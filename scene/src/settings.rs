@@ -71,6 +71,9 @@ pub struct StreamingSettings {
     pub target_error: f64,
     /// Time within which a change shall be traced, ms, by a pool of fitting size; 0: the pool keeps its size.
     pub latency_ms: f64,
+    /// Whether virtual surface lights move to the objects from which most light reaches others; else they lie equally
+    /// dense everywhere.
+    pub adaptive: bool,
 }
 
 impl StreamingSettings {
@@ -106,6 +109,7 @@ impl Default for StreamingSettings {
             distance_map_px: 0,
             target_error: 0.0,
             latency_ms: 0.0,
+            adaptive: false,
         }
     }
 }

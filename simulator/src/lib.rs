@@ -3,6 +3,7 @@
 
 mod apportion;
 pub mod bench;
+pub mod budgets;
 pub mod cancel;
 pub mod change;
 pub mod cli;

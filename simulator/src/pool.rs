@@ -4,14 +4,19 @@
 //! whoever traces: in a ring it is paper A's queue, the oldest path first. A path keeps the points it passed, too, so that
 //! a change of the scene is followed by tracing those again that met it.
 
+mod also;
+
 use crate::{
     disturbance::Disturbance,
     encounters::Encounters,
     flux::{Deposit, VslFlux},
+    owner::OwnerTable,
     tracer::{Path, PathBatch},
     trail::Vertex,
 };
+use also::OtherLights;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Paths in fixed slots, and the flux that they sum to.
 #[derive(Clone, Debug)]
@@ -28,6 +33,8 @@ pub struct PathPool {
     /// Slots that hold a path, per column.
     valid: Vec<u32>,
     flux: VslFlux,
+    /// The same light, summed in other virtual surface lights as well.
+    also: Option<OtherLights>,
 }
 
 /// One path: where its deposits are, and when it was traced.
@@ -53,6 +60,7 @@ impl PathPool {
             columns,
             valid: vec![0; count],
             flux: VslFlux::new(vsls, count),
+            also: None,
         }
     }
 
@@ -75,12 +83,15 @@ impl PathPool {
         self.trails[path.slot as usize] = vertices;
         self.valid[column as usize] += 1;
         self.flux.add(column, path.deposits, birth_ms);
+        if let Some(also) = &mut self.also {
+            also.add(column, path, birth_ms);
+        }
     }
 
     /// Empties the slots of `slots` after the first `kept` of them; all of these are a column of their own.
     pub fn truncate(&mut self, slots: std::ops::Range<u32>, kept: u32) {
         let column = self.column_of(slots.start);
-        if kept > slots.len() as u32 / 2 {
+        if kept > slots.len() as u32 / 2 || self.also.is_some() {
             (slots.start + kept..slots.end).for_each(|slot| self.take_back(slot, column));
             return;
         }
@@ -117,10 +128,18 @@ impl PathPool {
                 continue;
             }
             let column = self.column_of(slot);
+            let vertices = self.trails[slot as usize];
+            let (marks, uvs) = (self.vertices.get(vertices), &self.uvs[vertices.range()]);
             let deposits = self.deposits.get_mut(deposits);
             self.flux.subtract(column, deposits, birth_ms);
+            if let Some(also) = &mut self.also {
+                also.subtract(column, &Path { slot, deposits, vertices: marks, uvs }, birth_ms);
+            }
             deposits.iter_mut().for_each(|deposit| *deposit = deposit.scaled(factor));
             self.flux.add(column, deposits, birth_ms);
+            if let Some(also) = &mut self.also {
+                also.add(column, &Path { slot, deposits, vertices: marks, uvs }, birth_ms);
+            }
         }
     }
 
@@ -132,10 +151,40 @@ impl PathPool {
         let old = std::mem::take(&mut self.slots[slot as usize]);
         if old.valid {
             self.flux.subtract(column, self.deposits.get(old.deposits), old.birth_ms);
+            if let Some(also) = &mut self.also {
+                let vertices = self.trails[slot as usize];
+                let path = Path {
+                    slot,
+                    deposits: self.deposits.get(old.deposits),
+                    vertices: self.vertices.get(vertices),
+                    uvs: &self.uvs[vertices.range()],
+                };
+                also.subtract(column, &path, old.birth_ms);
+            }
             self.deposits.remove(old.deposits);
             self.vertices.remove(std::mem::take(&mut self.trails[slot as usize]));
             self.valid[column as usize] -= 1;
         }
+    }
+
+    /// From now on, sums the flux of `vsls` lights of another placement on the same scene, too, whose `owners` these are: of
+    /// all paths that are put into the pool.
+    ///
+    /// # Panics
+    /// If there are paths already.
+    pub(crate) fn sum_also(&mut self, owners: Arc<OwnerTable>, vsls: usize) {
+        assert!(self.valid.iter().all(|&valid| valid == 0), "the pool is empty");
+        self.also = Some(OtherLights::new(owners, VslFlux::new(vsls, self.valid.len())));
+    }
+
+    /// The flux in the lights of the other placement, if it is summed.
+    pub(crate) fn also(&self) -> Option<&VslFlux> {
+        self.also.as_ref().map(OtherLights::flux)
+    }
+
+    /// Forgets the other placement.
+    pub(crate) fn forget_also(&mut self) {
+        self.also = None;
     }
 
     /// The flux that the pool's paths sum to.

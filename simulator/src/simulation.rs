@@ -2,6 +2,7 @@
 //! and whoever embeds the simulator.
 
 use crate::{
+    budgets::{Budgets, Densities},
     cancel::Cancel,
     change::Moved,
     emitters::{Emitters, LightSlots},
@@ -44,20 +45,61 @@ impl Simulation {
     /// [`Simulation::new`], or `None` soon after it was cancelled. Who owns what is kept where the process keeps things
     /// ([`photonstream_scene::kept`]).
     pub fn new_unless(scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        Self::made(scene, OwnerCache::of_this_process(), cancel)
+        Self::made(scene, &Densities::default(), OwnerCache::of_this_process(), cancel)
     }
 
-    fn made(scene: Arc<Scene>, cache: Option<&OwnerCache>, cancel: &Cancel) -> Option<Self> {
-        let mut placement = Placement::new_unless(&scene, cancel)?;
+    fn made(
+        scene: Arc<Scene>,
+        densities: &Densities,
+        cache: Option<&OwnerCache>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        let placement = Placement::new_unless(&scene, densities, cancel)?;
+        let emitters = Arc::new(Emitters::new(&scene));
+        Self::of_placement(scene, placement, emitters, cache, cancel)
+    }
+
+    fn of_placement(
+        scene: Arc<Scene>,
+        mut placement: Placement,
+        emitters: Arc<Emitters>,
+        cache: Option<&OwnerCache>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
         let owners = match cache {
             Some(cache) => cache.owners(&scene, &mut placement, cancel)?,
             None => kept::computed(&scene, &mut placement, cancel)?,
         };
         let owners = Arc::new(owners);
-        let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
         let exposed = exposure::shares(&scene, &placement).into();
         cancel.or(Self { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed })
+    }
+
+    /// The same scene with other numbers of virtual surface lights on its surfaces, in their order; the pool is split as
+    /// before, so that [`crate::ledger::Migration`] keeps every path. `None` soon after it was cancelled.
+    ///
+    /// # Panics
+    /// If there are not as many shares as surfaces.
+    pub fn with_shares_unless(&self, shares: &[u32], cancel: &Cancel) -> Option<Self> {
+        let placement = self.placement.with_shares_unless(&self.scene, shares, cancel)?;
+        Self::of_placement(Arc::clone(&self.scene), placement, Arc::clone(&self.emitters), None, cancel)
+    }
+
+    /// Where the scene is adaptive, with virtual surface lights where the light of its filled pool is; else the same.
+    pub fn adapted(self) -> Self {
+        if !self.scene.streaming.adaptive {
+            return self;
+        }
+        let reaching = self.fill().reaching_watts(&self.scene, &self.placement);
+        let budgets = Budgets::new(&self.scene, &self.placement, &reaching);
+        let cancel = Cancel::default();
+        match budgets.next() {
+            Some(shares) => {
+                self.with_shares_unless(shares, &cancel).expect("invariant: nobody else can cancel it")
+            }
+            None => self,
+        }
     }
 
     /// Whether the virtual surface lights of `scene` are those of this simulation: a version of its scene in which no
@@ -101,12 +143,21 @@ impl Simulation {
 
     /// [`Simulation::reloaded`], or `None` soon after it was cancelled.
     pub fn reloaded_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        Some(Self::made(scene, None, cancel)?.with_split_of(self))
+        let densities = self.densities_for(&scene);
+        Some(Self::made(scene, &densities, None, cancel)?.with_split_of(self))
     }
 
     /// [`Simulation::reloaded_unless`], with who owns what kept as by [`Simulation::new_unless`]: for scenes that may come again.
     pub(crate) fn reloaded_and_kept_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        Some(Self::new_unless(scene, cancel)?.with_split_of(self))
+        let densities = self.densities_for(&scene);
+        let cache = OwnerCache::of_this_process();
+        Some(Self::made(scene, &densities, cache, cancel)?.with_split_of(self))
+    }
+
+    /// How dense lights lie on what `scene` has of the same name, where both are adaptive: it is probably lit alike.
+    fn densities_for(&self, scene: &Scene) -> Densities {
+        let are_adaptive = self.scene.streaming.adaptive && scene.streaming.adaptive;
+        if are_adaptive { Densities::of(&self.scene, &self.placement) } else { Densities::default() }
     }
 
     /// A ledger with an empty pool.

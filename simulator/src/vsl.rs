@@ -33,6 +33,11 @@ pub struct Vsl {
 }
 
 impl Vsl {
+    /// Where it is on its object: equal for lights that are the same.
+    pub(crate) fn place(&self) -> (Surface, u32, [u32; 2]) {
+        (self.surface, self.triangle, self.barycentric.map(f32::to_bits))
+    }
+
     /// Position in its object's rest space, in m.
     pub fn position_rest(&self, geometry: &Geometry) -> Vec3 {
         surface::point(geometry.rest_triangle(self.triangle), self.barycentric[0], self.barycentric[1])

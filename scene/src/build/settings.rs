@@ -80,6 +80,7 @@ pub(super) fn streaming(
         latency_ms: field
             .key("latency_ms")
             .number(latency_ms, "a time from 0 to 60000 ms", |x| (0.0..=60_000.0).contains(&x))?,
+        adaptive: *config.adaptive.get_or_insert(d.adaptive),
     })
 }
 

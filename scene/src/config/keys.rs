@@ -135,6 +135,7 @@ fn every_key() -> SceneConfig {
             distance_map_px: Some(8),
             target_error: Some(1.0),
             latency_ms: Some(1.0),
+            adaptive: Some(true),
         },
         render: RenderConfig {
             width_px: Some(1),

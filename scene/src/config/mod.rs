@@ -268,6 +268,8 @@ pub struct StreamingConfig {
     pub target_error: Option<f64>,
     /// Time within which a change shall be traced.
     pub latency_ms: Option<f64>,
+    /// Whether virtual surface lights go where the light is.
+    pub adaptive: Option<bool>,
 }
 
 /// `[render]`: default settings of the renderers; see [`crate::RenderSettings`].

@@ -6,7 +6,7 @@ mod schedule;
 
 pub use schedule::Schedule;
 
-use crate::{disturbance::Obstacle, placement::Placement, vsl::Vsl};
+use crate::{cancel::Cancel, disturbance::Obstacle, placement::Placement, vsl::Vsl};
 use glam::Vec3;
 use photonstream_scene::{Geometry, Scene, bvh::Ray};
 use photonstream_shading::{
@@ -14,7 +14,7 @@ use photonstream_shading::{
     surface,
 };
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 /// The map of one light: two texels a word, row by row.
 pub type Map = Arc<[u32]>;
@@ -33,6 +33,31 @@ pub fn all(scene: &Scene, placement: &Placement) -> Vec<u32> {
         .zip(&placement.vsls)
         .for_each(|(map, vsl)| View::of(&scene.geometry, vsl).trace(scene, edge, map));
     maps
+}
+
+/// The maps of the lights of `placement` that are not where one of `before` is, by number, on the present rayon pool; none
+/// where the scene asks for none. Nobody needs all of them where it was cancelled.
+pub(crate) fn of_new_lights(
+    scene: &Scene,
+    placement: &Placement,
+    before: &Placement,
+    cancel: &Cancel,
+) -> Vec<(u32, Map)> {
+    let edge = scene.streaming.distance_map_px;
+    if edge == 0 {
+        return Vec::new();
+    }
+    let there: HashSet<_> = before.vsls.iter().map(Vsl::place).collect();
+    let lights: Vec<_> =
+        placement.vsls.iter().zip(0..).filter(|(vsl, _)| !there.contains(&vsl.place())).collect();
+    let maps = lights.into_par_iter().map(|(vsl, number)| {
+        let mut map = vec![0; words(edge)];
+        if !cancel.is_cancelled() {
+            View::of(&scene.geometry, vsl).trace(scene, edge, &mut map);
+        }
+        (number, map.into())
+    });
+    maps.collect()
 }
 
 /// Words of a map of `edge`² texels.

@@ -1,8 +1,12 @@
 //! Turns placements and versions of a scene into maps to trace, the coarse ones of all lights first, and keeps what was traced.
 
 use super::{Extent, Map, MapTask, Traced, View, words};
-use crate::{change::Moved, disturbance::Obstacle, simulation::Simulation};
-use std::{collections::VecDeque, sync::Arc};
+use crate::{change::Moved, disturbance::Obstacle, simulation::Simulation, vsl::Vsl};
+use photonstream_scene::Scene;
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::Arc,
+};
 
 /// A map is traced as a whole rather than by more obstacles than this.
 const MOST_OBSTACLES: usize = 16;
@@ -63,6 +67,49 @@ impl Schedule {
             changed: (0..count as u32).collect(),
             is_changed: vec![true; count],
         })
+    }
+
+    /// Goes on with other lights in the place of `old`: those that stay where they are keep their maps, `traced` has those
+    /// of others that are known, by number, as `traced_in` shows them. What was begun by the old schedule is lost.
+    pub fn following(
+        old: Self,
+        simulation: &Simulation,
+        number: u64,
+        traced: Vec<(u32, Map)>,
+        traced_in: &Scene,
+    ) -> Option<Self> {
+        let mut next = Self::new(simulation, number)?;
+        if next.edge != old.edge {
+            return Some(next);
+        }
+        let before = old.simulation.placement.vsls.iter().map(Vsl::place).zip(&old.lights);
+        let before: HashMap<_, _> = before.collect();
+        for (light, vsl) in next.lights.iter_mut().zip(&simulation.placement.vsls) {
+            let Some(old) = before.get(&vsl.place()) else { continue };
+            light.map = Arc::clone(&old.map);
+            light.pending = match old.pending {
+                // What was being done is not.
+                _ if old.is_in_flight => Pending::Whole,
+                Pending::Since(_) => Pending::Whole,
+                pending => pending,
+            };
+        }
+        let is_same = Arc::ptr_eq(&traced_in.geometry, &old.simulation.scene.geometry);
+        for (vsl, map) in traced {
+            let light = &mut next.lights[vsl as usize];
+            light.map = map;
+            light.pending = if is_same { Pending::Nothing } else { Pending::Whole };
+        }
+        // What has moved since.
+        next.simulation.scene = Arc::clone(&old.simulation.scene);
+        next.revise(simulation);
+        let Self { queue, lights, .. } = &mut next;
+        queue.retain(|&vsl| {
+            let light = &mut lights[vsl as usize];
+            light.is_queued = light.pending != Pending::Nothing;
+            light.is_queued
+        });
+        Some(next)
     }
 
     /// Edge of the maps in texels.

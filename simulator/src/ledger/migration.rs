@@ -10,12 +10,14 @@ use crate::{
     change::{ALL, LightRevision, at_most, obstacle, reach_of, reflects_alike},
     disturbance::Disturbance,
     flux::Deposit,
+    owner::OwnerTable,
     simulation::Simulation,
     tracer::Path,
     trail::{Event, Vertex},
 };
 use glam::Vec3;
 use photonstream_scene::{Object, Scene};
+use std::sync::Arc;
 
 /// What the step from one scene to any other means for the paths of the old one.
 #[derive(Clone, Debug)]
@@ -28,6 +30,8 @@ pub struct Migration {
     disturbance: Disturbance,
     /// The lights are the old ones in the same order: their patches are numbered alike.
     same_owners: bool,
+    /// The lights whose flux is to be summed, too, and their number.
+    fades_from: Option<(Arc<OwnerTable>, usize)>,
 }
 
 /// The triangle is in the old scene alone.
@@ -59,7 +63,14 @@ impl Migration {
             })
             .collect();
         let same_owners = old.placement == new.placement && triangles.iter().zip(0..).all(|(&t, i)| t == i);
-        Self { lights, triangles, disturbance, same_owners }
+        Self { lights, triangles, disturbance, same_owners, fades_from: None }
+    }
+
+    /// The same, where the new ledger sums the flux of the lights of `old`, too, until [`Ledger::end_fade`]: `old` shows the
+    /// same surfaces.
+    pub fn fading_from(mut self, old: &Simulation) -> Self {
+        self.fades_from = Some((Arc::clone(&old.owners), old.placement.vsls.len()));
+        self
     }
 }
 
@@ -122,6 +133,9 @@ impl Ledger {
         next.structure = self.structure + 1;
         next.units.fill(next.version);
         (next.counters, next.savings) = (self.counters, self.savings);
+        if let Some((owners, vsls)) = &migration.fades_from {
+            next.pool.sum_also(Arc::clone(owners), *vsls);
+        }
         let is_replay = next.given.is_empty();
         let mut moved = Moved::default();
         for (index, source) in migration.lights.iter().enumerate() {

@@ -7,6 +7,7 @@
 //! are traced again, the brightest first, so that light changes gradually and never goes out. A batch that was under way
 //! in an older version is taken in too, and judged in the same way when it comes.
 
+mod importance;
 mod migration;
 mod queue;
 mod reading;
@@ -109,6 +110,8 @@ pub struct Ledger {
     waiting: BTreeMap<u64, (Task, PathBatch, u32)>,
     counters: Counters,
     refinement: Refinement,
+    /// Nothing is refined for now.
+    holds: bool,
     /// Watts per unit of each column.
     watts: Vec<Vec3>,
     savings: Savings,
@@ -145,6 +148,7 @@ impl Ledger {
                 vsls,
                 &emitters,
             ),
+            holds: false,
             watts: emitters.column_watts(scene),
             emitters,
             savings: Savings::default(),
@@ -332,11 +336,18 @@ impl Ledger {
         self.empty == 0 && self.stale_paths == 0
     }
 
+    /// Whether to add no samples beyond the pool for now, and not to count as converged: the virtual surface lights will be
+    /// others soon, which have to be refined from the pool on.
+    pub fn hold_refinement(&mut self, holds: bool) {
+        self.holds = holds;
+    }
+
     /// Whether every slot holds a path of the present version, and the light is refined as far as it is to be. A stream
     /// of fresh samples goes on from there; replayed samples are all traced.
     pub fn is_converged(&self) -> bool {
         let is_traced = self.is_settled() && self.is_full();
         is_traced
+            && !self.holds
             && (self.sampling == Sampling::Fresh || (self.in_flight() == 0 && self.refinement.is_done()))
     }
 

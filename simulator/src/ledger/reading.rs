@@ -54,4 +54,20 @@ impl Ledger {
         let (flux, more) = (self.pool.flux(), self.refinement.flux());
         (0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales))
     }
+
+    /// The flux of the lights from which those of this ledger fade ([`super::Migration::fading_from`]), in their order; `None`
+    /// where they do not. Only the pool's paths are in it.
+    pub fn readings_before(&self, scene: &Scene) -> Option<impl Iterator<Item = FluxReading>> {
+        let flux = self.pool.also()?;
+        let mut scales = self.scales(scene);
+        for (column, scale) in scales.iter_mut().enumerate() {
+            scale.paths -= self.refinement.paths(column);
+        }
+        Some((0..flux.vsls() as u32).map(move |vsl| flux.read(vsl, &scales)))
+    }
+
+    /// Sums no other lights' flux any more.
+    pub fn end_fade(&mut self) {
+        self.pool.forget_also();
+    }
 }

@@ -45,7 +45,7 @@ impl Ledger {
         if self.sampling == Sampling::Fresh {
             return self.next_of_ring();
         }
-        if !is_settled {
+        if !is_settled || self.holds {
             return None;
         }
         let scales = self.all_scales();

@@ -6,12 +6,17 @@
 //! are renewed when they surface, which is exact since distances only grow while points are removed, and neighbours
 //! come from an R*-tree: O(n log n) instead of O(n) a removal; more points are drawn than paper A's 10 % more, see [`OVERSAMPLING`];
 //! and triangles shrink less where lights are dense.
+//!
+//! Where lights move to where the light is ([`crate::budgets`]), those that stay do not stir: a surface that gets more keeps
+//! all that it has, and one that gets fewer loses those with the closest neighbours.
 
 mod draw;
+mod retiring;
 mod share;
 mod thin;
 
 use crate::{
+    budgets::Densities,
     cancel::Cancel,
     owner::OwnerTable,
     patch::{self, Patch},
@@ -19,6 +24,7 @@ use crate::{
 };
 use photonstream_scene::Scene;
 use rayon::prelude::*;
+use share::Share;
 use std::ops::Range;
 
 /// How many points are drawn for each that stays. Paper A draws 1.1; 2 lower the relative RMSE of indirect light by 2 to
@@ -28,7 +34,7 @@ pub const OVERSAMPLING: f64 = 2.0;
 /// The virtual surface lights of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// All lights, ordered by surface.
+    /// All lights, ordered by surface; then those that are retiring, which own nothing.
     pub vsls: Vec<Vsl>,
     /// The lights of each surface, ordered by surface.
     pub surfaces: Vec<(Surface, Range<u32>)>,
@@ -46,45 +52,75 @@ impl Placement {
         Self::with(scene, settings.vsls, settings.seed, settings.placement_scale, OVERSAMPLING)
     }
 
-    /// [`Placement::new`], or `None` soon after it was cancelled.
-    pub fn new_unless(scene: &Scene, cancel: &Cancel) -> Option<Self> {
+    /// [`Placement::new`], or `None` soon after it was cancelled; as dense on each surface as `densities` say.
+    pub(crate) fn new_unless(scene: &Scene, densities: &Densities, cancel: &Cancel) -> Option<Self> {
         let settings = &scene.streaming;
-        let scale = settings.placement_scale;
-        cancel.or(Self::place(scene, settings.vsls, settings.seed, scale, OVERSAMPLING, cancel))
+        let shares = share::by_area(scene, settings.vsls, densities);
+        let method = (settings.seed, settings.placement_scale, OVERSAMPLING);
+        cancel.or(Self::of_shares(scene, &shares, method, cancel))
     }
 
     /// [`Placement::new`] with all parameters given: the number of lights, the seed, the scale of triangles about their
     /// centroid, and the points drawn for each that stays.
     pub fn with(scene: &Scene, vsls: u32, seed: u64, triangle_scale: f32, oversampling: f64) -> Self {
-        Self::place(scene, vsls, seed, triangle_scale, oversampling, &Cancel::default())
+        let shares = share::by_area(scene, vsls, &Densities::default());
+        Self::of_shares(scene, &shares, (seed, triangle_scale, oversampling), &Cancel::default())
     }
 
     /// Too many lights where it was cancelled.
-    fn place(
+    fn of_shares(
         scene: &Scene,
-        vsls: u32,
-        seed: u64,
-        triangle_scale: f32,
-        oversampling: f64,
+        shares: &[Share],
+        (seed, triangle_scale, oversampling): (u64, f32, f64),
         cancel: &Cancel,
     ) -> Self {
-        let shares = share::by_area(scene, vsls);
-        let placed: Vec<Vec<Vsl>> = shares
-            .par_iter()
-            .map(|share| {
-                let drawn = (f64::from(share.vsls) * oversampling).ceil() as u32;
-                let points = draw::points(scene, share.surface, share.vsls, drawn, seed, triangle_scale);
-                thin::to(&scene.geometry, points, share.vsls as usize, cancel)
-            })
-            .collect();
-        let mut surfaces = Vec::with_capacity(shares.len());
-        let mut vsls = Vec::with_capacity(placed.iter().map(Vec::len).sum());
-        for (share, placed) in shares.iter().zip(placed) {
+        let placed = shares.par_iter().map(|share| {
+            let drawn = (f64::from(share.vsls) * oversampling).ceil() as u32;
+            let points = draw::points(scene, share.surface, share.vsls, drawn, seed, triangle_scale);
+            (share.surface, thin::to(&scene.geometry, points, 0, share.vsls as usize, cancel))
+        });
+        Self::of_surfaces(placed.collect())
+    }
+
+    fn of_surfaces(placed: Vec<(Surface, Vec<Vsl>)>) -> Self {
+        let mut surfaces = Vec::with_capacity(placed.len());
+        let mut vsls = Vec::with_capacity(placed.iter().map(|(_, vsls)| vsls.len()).sum());
+        for (surface, placed) in placed {
             let first = vsls.len() as u32;
             vsls.extend(placed);
-            surfaces.push((share.surface, first..vsls.len() as u32));
+            surfaces.push((surface, first..vsls.len() as u32));
         }
         Self { vsls, surfaces, patches: Vec::new() }
+    }
+
+    /// The number of lights of each surface, in their order.
+    pub fn shares(&self) -> impl Iterator<Item = u32> {
+        self.surfaces.iter().map(|(_, vsls)| vsls.end - vsls.start)
+    }
+
+    /// The same scene with other numbers of lights on its surfaces, in their order: a surface that gets more keeps all that
+    /// it has, one that gets fewer loses those with the closest neighbours. `None` soon after it was cancelled.
+    ///
+    /// Areas are zero until [`Placement::measure_areas`], as with any new placement.
+    ///
+    /// # Panics
+    /// If there are not as many shares as surfaces.
+    pub fn with_shares_unless(&self, scene: &Scene, shares: &[u32], cancel: &Cancel) -> Option<Self> {
+        assert_eq!(shares.len(), self.surfaces.len(), "one share for each surface");
+        let settings = &scene.streaming;
+        let placed = self.surfaces.par_iter().zip(shares).map(|((surface, lights), &share)| {
+            let mut points: Vec<Vsl> = self.vsls[lights.start as usize..lights.end as usize].to_vec();
+            points.iter_mut().for_each(|point| point.area = 0.0);
+            let (there, scale) = (points.len(), settings.placement_scale);
+            if share as usize > there {
+                // Where a point was drawn before, its light is in the way: it is the first to go.
+                let drawn = (f64::from(share) * OVERSAMPLING).ceil() as u32;
+                points.extend(draw::points(scene, *surface, share, drawn, settings.seed, scale));
+            }
+            let fixed = if share as usize >= there { there } else { 0 };
+            (*surface, thin::to(&scene.geometry, points, fixed, share as usize, cancel))
+        });
+        cancel.or(Self::of_surfaces(placed.collect()))
     }
 
     /// Gives each light the area of its Voronoi cell on its surface, the set of points that it owns, and the polygon that

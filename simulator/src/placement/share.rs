@@ -1,6 +1,6 @@
-//! Turns a number of virtual surface lights into the share of each surface, by area.
+//! Turns a number of virtual surface lights into the share of each surface.
 
-use crate::{apportion::apportion, vsl::Surface};
+use crate::{apportion::apportion, budgets::Densities, vsl::Surface};
 use photonstream_scene::{ObjectId, Scene};
 use photonstream_shading::surface;
 
@@ -11,19 +11,22 @@ pub(super) struct Share {
     pub(super) vsls: u32,
 }
 
-/// At least one light for each reflecting side of each object with triangles, the rest by area (largest remainder), so
-/// that the sum is `vsls`, or the number of surfaces where that is more. Ordered by surface.
-pub(super) fn by_area(scene: &Scene, vsls: u32) -> Vec<Share> {
+/// At least one light for each reflecting side of each object with triangles, the rest by area times density (largest
+/// remainder), so that the sum is `vsls`, or the number of surfaces where that is more. Ordered by surface.
+pub(super) fn by_area(scene: &Scene, vsls: u32, densities: &Densities) -> Vec<Share> {
     let mut surfaces = Vec::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let area: f64 =
             object.triangles.clone().map(|t| surface::area(scene.geometry.rest_triangle(t))).sum();
         if !object.triangles.is_empty() {
             let id = ObjectId(index as u32);
-            surfaces.extend(object.sides.iter().map(|side| (Surface { object: id, side }, area)));
+            surfaces.extend(object.sides.iter().map(|side| {
+                let weight = area * densities.get(&object.name, side);
+                (Surface { object: id, side }, weight)
+            }));
         }
     }
-    let areas: Vec<f64> = surfaces.iter().map(|&(_, area)| area).collect();
-    let counts = apportion(&areas, vsls);
+    let weights: Vec<f64> = surfaces.iter().map(|&(_, weight)| weight).collect();
+    let counts = apportion(&weights, vsls);
     surfaces.into_iter().zip(counts).map(|((surface, _), vsls)| Share { surface, vsls }).collect()
 }

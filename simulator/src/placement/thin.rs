@@ -14,14 +14,20 @@ type Tree = RTree<GeomWithData<[f32; 3], u32>>;
 /// Removes points, one at a time, the one with the smallest (d_min1, d_min2) first, until `keep` remain; keeps order.
 ///
 /// Distances are in rest space and count between points with compatible normals only. Of equal pairs the lowest index
-/// goes first. Where it is cancelled, more remain.
-pub(super) fn to(geometry: &Geometry, points: Vec<Vsl>, keep: usize, cancel: &Cancel) -> Vec<Vsl> {
+/// goes first. The first `fixed` points stay in any case. Where it is cancelled, more remain.
+pub(super) fn to(
+    geometry: &Geometry,
+    points: Vec<Vsl>,
+    fixed: usize,
+    keep: usize,
+    cancel: &Cancel,
+) -> Vec<Vsl> {
     if points.len() <= keep {
         return points;
     }
     let spread = Spread::new(geometry, &points);
     let mut alive = vec![true; points.len()];
-    let mut heap: BinaryHeap<Reverse<Entry>> = (0..points.len() as u32)
+    let mut heap: BinaryHeap<Reverse<Entry>> = (fixed as u32..points.len() as u32)
         .take_while(|_| !cancel.is_cancelled())
         .map(|i| Reverse(spread.entry(i, &alive)))
         .collect();

@@ -9,10 +9,10 @@ use super::{
     ConfigSource,
     clock::Clock,
     edits,
-    ledger_actor::{Change, State, ToLedger},
+    ledger_actor::{Change, FromLedger, State, ToLedger},
     loader::Loaded,
     placements::Placements,
-    placer::Order,
+    placer::{Order, Placed},
     publisher_actor::Still,
     watcher::News,
 };
@@ -100,9 +100,9 @@ enum Event {
     /// The loader has ended.
     LoaderGone,
     /// The placer has done what it was told, or what it was told is not wanted any more.
-    Placed(Option<Box<Simulation>>),
-    /// The light of a version was shown whole.
-    Settled(u64),
+    Placed(Option<Box<Placed>>),
+    /// The ledger has something to say.
+    Ledger(FromLedger),
     /// It is time to look at the animation.
     Tick,
     ActorGone,
@@ -127,9 +127,9 @@ struct Director {
     /// The scenes to come.
     placements: Placements,
     to_placer: flume::Sender<Order>,
-    placed: flume::Receiver<Option<Box<Simulation>>>,
+    placed: flume::Receiver<Option<Box<Placed>>>,
     placer: JoinHandle<()>,
-    settled: flume::Receiver<u64>,
+    from_ledger: flume::Receiver<FromLedger>,
     /// Versions of the scene after the first.
     versions: u64,
     started: Instant,
@@ -182,7 +182,7 @@ impl Director {
             .recv(self.server.requests(), |request| request.map_or(Event::ActorGone, Event::Request))
             .recv(&self.actor_gone, |_| Event::ActorGone)
             .recv(&self.placed, |placed| placed.map_or(Event::ActorGone, Event::Placed))
-            .recv(&self.settled, |settled| settled.map_or(Event::ActorGone, Event::Settled));
+            .recv(&self.from_ledger, |told| told.map_or(Event::ActorGone, Event::Ledger));
         // Who is not there has nothing to tell.
         let selector = match &self.watching {
             Some(_) => selector.recv(&self.news, |news| news.map_or(Event::Unwatched, Event::News)),
@@ -205,9 +205,10 @@ impl Director {
         match event {
             Event::Stop => return Some(Ending::Stopped),
             Event::ActorGone => return None,
-            Event::Settled(version) if version == self.versions => self.clock.settled(),
+            Event::Ledger(FromLedger::Settled(version)) if version == self.versions => self.clock.settled(),
             // Of a version that is no longer shown.
-            Event::Settled(_) => {}
+            Event::Ledger(FromLedger::Settled(_)) => {}
+            Event::Ledger(FromLedger::Wants(lights)) => self.move_lights(lights),
             Event::Tick => self.tick(Instant::now()),
             Event::News(news) => self.hear(news),
             Event::Unwatched => {

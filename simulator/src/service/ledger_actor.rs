@@ -1,11 +1,13 @@
 //! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
 
+mod fade;
 mod progress;
 mod telemetry;
 
 pub use telemetry::State;
 
 use super::{
+    placer::Moved,
     published_maps::MapUpdate,
     publisher_actor::{PlacedRecords, Snapshot, Still},
     tracer_actor::{PathWork, Work},
@@ -15,11 +17,13 @@ use crate::{
     counters::Counters,
     distance_maps::{Schedule, Traced},
     ledger::{Ledger, Task},
+    placement::Placement,
     records,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
 };
 use crossbeam::queue::ArrayQueue;
+use fade::Fade;
 use photonstream_protocol::monotonic_ns;
 use std::{
     sync::Arc,
@@ -46,12 +50,36 @@ pub(super) enum ToLedger {
 pub(super) struct Version {
     pub(super) simulation: Simulation,
     pub(super) still: Arc<Still>,
-    /// When the edit arrived, monotonic ns.
-    pub(super) received_ns: u64,
+    /// Who wanted it.
+    pub(super) asked: Asked,
     /// Time of the simulated scene, s.
     pub(super) time_s: f64,
     /// Publish it only once its light is whole: time goes on in fixed steps.
     pub(super) only_whole: bool,
+}
+
+/// Who wants a version of the scene.
+pub(super) enum Asked {
+    /// Somebody, by an edit that arrived then, monotonic ns.
+    At(u64),
+    /// The ledger: the scene is the same, with lights elsewhere.
+    Nobody(Moved),
+}
+
+/// What the ledger tells of itself.
+pub(super) enum FromLedger {
+    /// A frame of the whole light of a version was published.
+    Settled(u64),
+    /// Lights had better lie elsewhere.
+    Wants(LightsWanted),
+}
+
+/// Where lights had better lie.
+pub(super) struct LightsWanted {
+    /// Instead of here.
+    pub(super) placement: Arc<Placement>,
+    /// The number on each of its surfaces.
+    pub(super) shares: Vec<u32>,
 }
 
 /// What the ledger can be told to do.
@@ -85,8 +113,7 @@ pub(super) struct LedgerActor {
     pub(super) after_paths: Option<u64>,
     /// Publish the first version only once its light is whole, as [`Version::only_whole`].
     pub(super) only_whole: bool,
-    /// Told whenever a frame of the whole light of a version was published.
-    pub(super) settled: flume::Sender<u64>,
+    pub(super) director: flume::Sender<FromLedger>,
 }
 
 struct Progress {
@@ -129,6 +156,10 @@ struct Progress {
     changed: bool,
     /// Paths were traced since it was last decided how the pool is split.
     split_is_due: bool,
+    /// Something has changed since it was last decided where virtual surface lights lie.
+    budgets_are_due: bool,
+    /// They come from where they were.
+    fade: Option<Fade>,
     next_frame: Instant,
     /// When the last frame was shown, or the first change after it came.
     shown_at: Instant,
@@ -171,6 +202,8 @@ impl LedgerActor {
             stepping: false,
             changed: true,
             split_is_due: true,
+            budgets_are_due: true,
+            fade: None,
             next_frame: started + period(&self.simulation),
             shown_at: started,
             frames: 0,
@@ -226,6 +259,10 @@ impl LedgerActor {
     fn hand_out(&self, progress: &mut Progress) -> bool {
         if !progress.paused && !self.is_at_limit(progress) {
             progress.follow_variance();
+            if let Some(wish) = progress.follow_light() {
+                // Whoever does not listen does not move lights.
+                let _ = self.director.send(FromLedger::Wants(wish));
+            }
         }
         let room = 2 * self.threads as u64 + 2;
         let has_maps = progress.maps.as_ref().is_some_and(|maps| !maps.is_whole());
@@ -264,7 +301,7 @@ impl LedgerActor {
     fn is_done(&self, progress: &Progress) -> bool {
         let ledger = &progress.ledger;
         let rests = self.is_at_limit(progress) && ledger.in_flight() == 0 && ledger.stale_paths() == 0;
-        (ledger.is_done() || rests) && progress.has_whole_maps()
+        (ledger.is_done() || rests) && progress.has_whole_maps() && progress.fade.is_none()
     }
 
     /// False where it is time to end.
@@ -324,7 +361,14 @@ impl LedgerActor {
             vsls.version = progress.places;
             records::write_places(&mut vsls.records, scene, &progress.simulation.placement);
         }
-        records::write_flux(&mut vsls.records, progress.ledger.readings(scene), progress.now_ms());
+        let (now_ms, time_s, is_in_steps) = (progress.now_ms(), progress.time_s, progress.is_in_steps());
+        match &mut progress.fade {
+            None => records::write_flux(&mut vsls.records, progress.ledger.readings(scene), now_ms),
+            Some(fade) => {
+                fade.go_on(begun, time_s, is_in_steps);
+                records::write_flux(&mut vsls.records, fade.readings(&progress.ledger, scene), now_ms);
+            }
+        }
         let still = Arc::clone(&progress.still);
         let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
@@ -340,12 +384,16 @@ impl LedgerActor {
         progress.next_frame = now + period(&progress.simulation).max(progress.publishing * PUBLISHING_SHARE);
         progress.frames += 1;
         progress.shown_at = now;
-        progress.changed = false;
         progress.stepping = false;
+        // While lights fade every frame is another one, and where they go then has to be decided.
+        progress.changed = match progress.end_fade_if_over() {
+            true => true,
+            false => progress.fade.is_some() && !progress.paused && !is_in_steps,
+        };
         if progress.unsettled && progress.is_whole() {
             progress.unsettled = false;
             // Whoever does not listen does not wait for it.
-            let _ = self.settled.send(progress.versions);
+            let _ = self.director.send(FromLedger::Settled(progress.versions));
         }
         Published::Yes
     }

@@ -21,6 +21,8 @@ pub(super) struct Wanted {
     pub(super) is_config: bool,
     /// It is the animation that wants it.
     pub(super) is_animated: bool,
+    /// The scene is the same, with these numbers of lights on its surfaces.
+    pub(super) shares: Option<Vec<u32>>,
     /// What is to be told from then on; `None`: what is told already.
     pub(super) notice: Option<Arc<str>>,
     /// Who waits for it.
@@ -44,8 +46,8 @@ impl Waiting {
 impl Wanted {
     /// A version of the scene at an instant of its animation, for an edit that came at `received_ns`.
     pub(super) fn version(scene: Scene, received_ns: u64, animated_s: Option<f64>) -> Self {
-        let (notice, waiting) = (None, Vec::new());
-        Self { scene, received_ns, animated_s, is_config: false, is_animated: false, notice, waiting }
+        let (shares, notice, waiting) = (None, None, Vec::new());
+        Self { scene, received_ns, animated_s, is_config: false, is_animated: false, shares, notice, waiting }
     }
 
     /// Takes the place of `older`.

@@ -24,12 +24,12 @@ fn room(edge: u32) -> Simulation {
 }
 
 /// The maps of a schedule, one after the other.
-fn maps(schedule: &Schedule) -> Vec<u32> {
+pub(crate) fn maps(schedule: &Schedule) -> Vec<u32> {
     (0..schedule.len() as u32).flat_map(|vsl| schedule.map(vsl).to_vec()).collect()
 }
 
 /// Traces until there is nothing to trace. Returns the number of rays.
-fn run(schedule: &mut Schedule) -> u64 {
+pub(crate) fn run(schedule: &mut Schedule) -> u64 {
     let mut rays = 0;
     while let Some(task) = schedule.next_task() {
         let traced = task.run();

@@ -1,5 +1,6 @@
 //! Tests of the simulator through its public interface.
 
+mod adaptive;
 mod animated;
 mod closed_forms;
 mod distance_maps;

@@ -11,9 +11,9 @@ use crate::{
     service::{
         clock::Clock,
         edits::{self, Edits, Versions},
-        ledger_actor::{Change, ToLedger, Version},
+        ledger_actor::{Asked, Change, LightsWanted, ToLedger, Version},
         placements::{Waiting, Wanted},
-        placer::Order,
+        placer::{Order, Placed},
         publisher_actor::Still,
         settings::{self, SettingsError},
         watcher::News,
@@ -147,22 +147,38 @@ impl Director {
         if let Some(scene) = self.at_present(&wanted.scene, wanted.animated_s) {
             (wanted.scene, wanted.animated_s) = (scene, Some(self.clock.time_s()));
         }
-        let scene = Arc::new(wanted.scene.clone());
+        let (scene, shares) = (Arc::new(wanted.scene.clone()), wanted.shares.clone());
         let is_kept = wanted.is_config;
         let cancel = self.placements.begin(wanted);
         // A placer that is gone says so by another way.
-        let _ = self.to_placer.send(Order { base: self.simulation.clone(), scene, is_kept, cancel });
+        let order = Order { base: self.simulation.clone(), scene, shares, is_kept, cancel };
+        let _ = self.to_placer.send(order);
     }
 
     /// Goes on with what the placer has made ready, if it is still wanted.
-    pub(super) fn take_placed(&mut self, simulation: Option<Box<Simulation>>) {
-        if let (Some(wanted), Some(simulation)) = (self.placements.finish(), simulation) {
-            self.swap(&simulation, wanted);
+    pub(super) fn take_placed(&mut self, placed: Option<Box<Placed>>) {
+        if let (Some(wanted), Some(placed)) = (self.placements.finish(), placed) {
+            self.swap(*placed, wanted);
         }
         self.place();
     }
 
-    fn swap(&mut self, simulation: &Simulation, wanted: Wanted) {
+    /// Has lights moved to where the ledger wants them, if they are those that it knows, and no other scene is to come.
+    pub(super) fn move_lights(&mut self, wish: LightsWanted) {
+        if self.placements.are_awaited() || !Arc::ptr_eq(&wish.placement, &self.simulation.placement) {
+            // It decides anew in the scene that comes.
+            return;
+        }
+        let scene = Scene::clone(&self.simulation.scene);
+        self.placements.append(Wanted {
+            shares: Some(wish.shares),
+            ..Wanted::version(scene, monotonic_ns(), Some(self.animated_s))
+        });
+        self.place();
+    }
+
+    fn swap(&mut self, placed: Placed, wanted: Wanted) {
+        let Placed { simulation, moved } = placed;
         let has_other_settings = wanted.scene.streaming != self.simulation.scene.streaming;
         if wanted.is_config || has_other_settings {
             self.clock.set(wanted.scene.streaming.fixed_step_ms, publish_period(&wanted.scene));
@@ -180,7 +196,11 @@ impl Director {
         }
         // In fixed steps, it is shown whole before the next one.
         self.clock.wait();
-        let reply = self.go_on(simulation.with_scene(Arc::new(scene)), still, wanted.received_ns);
+        let simulation = simulation.with_scene(Arc::new(scene));
+        let reply = match moved {
+            Some(moved) => self.go_on_with(simulation, still, Asked::Nobody(moved)),
+            None => self.go_on(simulation, still, wanted.received_ns),
+        };
         for Waiting { replier, steps } in wanted.waiting {
             replier.reply(if steps { self.change(Change::Step) } else { reply.clone() });
         }
@@ -212,12 +232,16 @@ impl Director {
     }
 
     fn go_on(&mut self, simulation: Simulation, still: Still, received_ns: u64) -> Reply {
+        self.go_on_with(simulation, still, Asked::At(received_ns))
+    }
+
+    fn go_on_with(&mut self, simulation: Simulation, still: Still, asked: Asked) -> Reply {
         (self.simulation, self.still) = (simulation, Arc::new(still));
         self.versions += 1;
         let version = Version {
             simulation: self.simulation.clone(),
             still: Arc::clone(&self.still),
-            received_ns,
+            asked,
             time_s: self.animated_s,
             only_whole: self.clock.is_fixed() && !self.simulation.scene.animation.is_empty(),
         };

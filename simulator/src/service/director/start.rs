@@ -39,7 +39,9 @@ impl Director {
         let still = Arc::new(Still::new(&scene));
         let edge = scene.streaming.distance_map_px as usize;
         let distances = place.records.len() * edge * edge / DISTANCE_TEXELS;
-        let spec = still.spec(place.records.len(), distances, None);
+        // Lights that move are shown where they were and where they are, for a while.
+        let times = if scene.streaming.adaptive { 2 } else { 1 };
+        let spec = still.spec(times * place.records.len(), times * distances, None);
         let publisher = Publisher::create(&options.channel, &spec)?;
         let server = ControlServer::start(&publisher)?;
 
@@ -50,8 +52,8 @@ impl Director {
         for records in std::iter::repeat_n(place, RECORD_SETS) {
             emptied.push(records).expect("invariant: the queue has room for all sets of records");
         }
-        // At most one message for each version, which this thread makes.
-        let (settled_sender, settled) = flume::unbounded();
+        // At most two messages for each version, which this thread makes.
+        let (tell_director, from_ledger) = flume::unbounded();
         let (farewells, actor_gone) = flume::bounded(1);
         let tracers = (0..threads)
             .map(|_| {
@@ -92,7 +94,7 @@ impl Director {
             emptied,
             after_paths: options.after_paths,
             only_whole: scene.streaming.fixed_step_ms.is_some() && !scene.animation.is_empty(),
-            settled: settled_sender,
+            director: tell_director,
         };
         let ledger = {
             let farewell = Farewell(farewells.clone());
@@ -142,7 +144,7 @@ impl Director {
             to_placer,
             placed,
             placer,
-            settled,
+            from_ledger,
             versions: 0,
             simulation,
             still,

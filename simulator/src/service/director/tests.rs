@@ -3,7 +3,10 @@
 
 use super::{Director, Event, Options};
 use crate::{
-    service::{placer::Order, watcher::News},
+    service::{
+        placer::{Order, Placed},
+        watcher::News,
+    },
     simulation::Simulation,
 };
 use photonstream_protocol::{ChannelName, ControlClient, Reply, Request};
@@ -36,7 +39,7 @@ struct Directed {
     channel: ChannelName,
     orders: flume::Receiver<Order>,
     /// A placer that is there.
-    _placer: flume::Sender<Option<Box<Simulation>>>,
+    _placer: flume::Sender<Option<Box<Placed>>>,
 }
 
 fn start(name: &str, scene: Scene) -> Directed {
@@ -48,6 +51,10 @@ fn start(name: &str, scene: Scene) -> Directed {
     let (placer, placed) = flume::bounded(1);
     director.placed = placed;
     Directed { director, channel, orders, _placer: placer }
+}
+
+fn placed_anew(simulation: Simulation) -> Box<Placed> {
+    Box::new(Placed { simulation, moved: None })
 }
 
 impl Directed {
@@ -87,7 +94,7 @@ impl Directed {
     /// Answers an order, as the placer does.
     fn place(&mut self, order: &Order) {
         let placed = order.base.reloaded_unless(Arc::clone(&order.scene), &order.cancel);
-        self.director.handle(Event::Placed(placed.map(Box::new)));
+        self.director.handle(Event::Placed(placed.map(placed_anew)));
     }
 
     fn lights(&self) -> usize {
@@ -170,7 +177,7 @@ fn the_newest_wins() {
     assert!(order.cancel.is_cancelled() && directed.orders.is_empty(), "one order at a time");
     // It was ready before it heard of that.
     let late = order.base.reloaded(Arc::clone(&order.scene));
-    directed.director.handle(Event::Placed(Some(Box::new(late))));
+    directed.director.handle(Event::Placed(Some(placed_anew(late))));
     assert_eq!(directed.lights(), 80);
     let order = directed.order();
     assert_eq!(order.scene.streaming.vsls, 110);
@@ -306,8 +313,8 @@ fn an_impossible_instant_is_passed_over() {
     let mut seen = Vec::new();
     while directed.director.is_moving() {
         while directed.director.due().is_none() {
-            let settled = directed.director.settled.recv_timeout(PATIENCE).unwrap();
-            directed.director.handle(Event::Settled(settled));
+            let told = directed.director.from_ledger.recv_timeout(PATIENCE).unwrap();
+            directed.director.handle(Event::Ledger(told));
         }
         directed.director.tick(Instant::now());
         let spot = directed.running().light("spot").unwrap().0 as usize;
@@ -377,7 +384,7 @@ fn a_dead_watcher_is_told() {
         let event = directed.director.wait(&stopped);
         let is_it = matches!(event, Event::Unwatched);
         // The placer that was replaced may be first.
-        assert!(is_it || matches!(event, Event::Settled(_) | Event::ActorGone));
+        assert!(is_it || matches!(event, Event::Ledger(_) | Event::ActorGone));
         directed.director.handle(event);
         if is_it {
             break;

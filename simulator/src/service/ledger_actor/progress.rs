@@ -1,7 +1,7 @@
 //! Turns new versions of the scene into what the ledger goes on with, and the time that changes take into budgets.
 
-use super::{Progress, SceneChange, Version};
-use crate::{distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
+use super::{Asked, Fade, LightsWanted, Moved, Progress, SceneChange, Version};
+use crate::{budgets::Budgets, distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
 use photonstream_protocol::{PatchRecord, monotonic_ns};
 use photonstream_scene::Geometry;
 use std::{
@@ -21,11 +21,15 @@ pub(super) struct Placed {
 impl Progress {
     /// Goes on in a new version of the scene. Batches under way stay those of the old one.
     pub(super) fn edit(&mut self, version: Version) {
-        let Version { simulation, still, received_ns, time_s, only_whole } = version;
+        let Version { simulation, still, asked, time_s, only_whole } = version;
+        let (received_ns, moved) = match asked {
+            Asked::At(received_ns) => (Some(received_ns), None),
+            Asked::Nobody(moved) => (None, Some(moved)),
+        };
         let follows_variance = simulation.scene.streaming.latency_ms > 0.0;
         let simulation =
             if follows_variance { simulation.with_split_of(&self.simulation) } else { simulation };
-        if Arc::ptr_eq(&simulation.owners, &self.simulation.owners) {
+        if Arc::ptr_eq(&simulation.placement, &self.simulation.placement) {
             let is_still = Arc::ptr_eq(&simulation.scene.geometry, &self.simulation.scene.geometry);
             self.places += u64::from(!is_still);
             let change = SceneChange::between(&self.simulation, &simulation);
@@ -38,11 +42,17 @@ impl Progress {
             self.places += 1;
             self.placements += 1;
             let migration = Migration::between(&self.simulation, &simulation);
+            let numbers = moved.as_ref().and_then(|moved| moved.numbers.clone());
+            let migration = match numbers {
+                Some(_) => migration.fading_from(&self.simulation),
+                None => migration,
+            };
+            self.fade = numbers.map(Fade::new);
             // Its place is taken at once.
             let old = std::mem::replace(&mut self.ledger, simulation.ledger());
             let budget = self.budget(&simulation);
             self.ledger = old.migrate(&migration, &simulation, budget);
-            self.replace_maps(&simulation);
+            self.replace_maps(&simulation, moved);
         }
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;
@@ -52,12 +62,16 @@ impl Progress {
         if !self.changed {
             self.shown_at = Instant::now();
         }
-        self.edit_received_ns = received_ns;
-        // An edit that needs no ray is traced with its arrival.
-        self.traced_ns = monotonic_ns();
-        if self.waiting_since_ns.is_none() {
-            self.waiting_since_ns = Some(received_ns);
-            self.paths_before_change = self.ledger.counters().paths;
+        self.budgets_are_due = true;
+        self.ledger.hold_refinement(self.simulation.scene.streaming.adaptive);
+        if let Some(received_ns) = received_ns {
+            self.edit_received_ns = received_ns;
+            // An edit that needs no ray is traced with its arrival.
+            self.traced_ns = monotonic_ns();
+            if self.waiting_since_ns.is_none() {
+                self.waiting_since_ns = Some(received_ns);
+                self.paths_before_change = self.ledger.counters().paths;
+            }
         }
         // A power alone moves no path.
         self.split_is_due |= !self.ledger.is_settled();
@@ -65,9 +79,36 @@ impl Progress {
         self.changed = true;
     }
 
-    /// Begins the maps of other lights. Maps under way are lost.
-    fn replace_maps(&mut self, simulation: &Simulation) {
-        self.maps = Schedule::new(simulation, self.placements);
+    /// Begins the maps of other lights, but for those that are known. Maps under way are lost.
+    fn replace_maps(&mut self, simulation: &Simulation, known: Option<Moved>) {
+        self.maps = match (self.maps.take(), known) {
+            (Some(old), Some(Moved { maps, scene, .. })) => {
+                Schedule::following(old, simulation, self.placements, maps, &scene)
+            }
+            _ => Schedule::new(simulation, self.placements),
+        };
+    }
+
+    /// Where the scene is adaptive, and lights had better lie elsewhere, where: decided once after each change, as soon as its
+    /// light is whole. Until they are there nothing is refined.
+    pub(super) fn follow_light(&mut self) -> Option<LightsWanted> {
+        let scene = &self.simulation.scene;
+        let is_ready = self.ledger.is_settled() && self.fade.is_none();
+        if !self.budgets_are_due || !is_ready || !scene.streaming.adaptive {
+            return None;
+        }
+        self.budgets_are_due = false;
+        let placement = &self.simulation.placement;
+        let reaching = self.ledger.reaching_watts(scene, placement);
+        let budgets = Budgets::new(scene, placement, &reaching);
+        let next = budgets.next().map(<[u32]>::to_vec);
+        // Those that have faded out are not needed any more.
+        let has_retiring = placement.owning() < placement.vsls.len();
+        let next = next.or(has_retiring.then_some(budgets.present));
+        self.ledger.hold_refinement(next.is_some());
+        // The last frame did not say that all is done.
+        self.changed = true;
+        next.map(|shares| LightsWanted { placement: Arc::clone(placement), shares })
     }
 
     /// Tasks of all kinds that are under way.
@@ -122,7 +163,8 @@ impl Progress {
     /// as soon as its light is whole, so that a still scene comes to rest.
     pub(super) fn follow_variance(&mut self) {
         let scene = &self.simulation.scene;
-        if !self.split_is_due || scene.streaming.latency_ms <= 0.0 || !self.ledger.is_settled() {
+        let is_ready = self.ledger.is_settled() && self.fade.is_none();
+        if !self.split_is_due || scene.streaming.latency_ms <= 0.0 || !is_ready {
             return;
         }
         self.split_is_due = false;
