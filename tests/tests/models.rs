@@ -41,12 +41,12 @@ fn load(config: &str) -> Option<Scene> {
     }
 }
 
-/// A scene's light as it is published: 10 000 lights, 2¹⁸ paths, distance maps of 32 texels.
+/// A scene's light as it is published: 10 000 lights, at rest, 2¹⁸ paths, distance maps of 32 texels.
 fn stream(scene: Scene) -> (Arc<Scene>, VslFrame) {
     let mut scene = scene;
     (scene.streaming.vsls, scene.streaming.pool_paths) = (10_000, 1 << 18);
     (scene.streaming.target_error, scene.streaming.distance_map_px) = (0.0, 32);
-    let simulation = Simulation::new(Arc::new(scene));
+    let simulation = Simulation::new(Arc::new(scene)).adapted();
     let scene = Arc::clone(&simulation.scene);
     let ledger = simulation.fill();
     let mut vsls = records::vsl_records(&scene, &simulation.placement);

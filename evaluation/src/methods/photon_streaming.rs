@@ -38,7 +38,7 @@ pub(super) fn place(scene: &Scene, (vsls, seed, is_as_paper): (u32, u64, bool)) 
         let exposed = exposure::shares(&scene, &placement).into();
         Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed }
     } else {
-        Simulation::new(scene)
+        Simulation::new(scene).adapted()
     };
     (simulation, begun.elapsed().as_secs_f64() * 1e3)
 }

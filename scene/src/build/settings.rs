@@ -31,10 +31,13 @@ pub(super) fn streaming(
         let remedy = "choose one of them, or leave the key out";
         return Err(field.key("distance_map_px").invalid(distance_map_px, "0, 8, 16, 32 or 64", remedy));
     }
-    let texels = u64::from(vsls) * u64::from(distance_map_px * distance_map_px);
+    let adaptive = *config.adaptive.get_or_insert(d.adaptive);
+    // Lights that move have a map where they were and one where they are.
+    let maps = u64::from(vsls) * if adaptive { 2 } else { 1 };
+    let texels = maps * u64::from(distance_map_px * distance_map_px);
     if texels > StreamingSettings::MAX_DISTANCE_TEXELS {
-        let expected = "at most 2³⁰ texels in the maps of all virtual surface lights";
-        let remedy = "choose a smaller distance_map_px or fewer vsls";
+        let expected = "at most 2³⁰ texels in the maps of all virtual surface lights, twice as many where they are adaptive";
+        let remedy = "choose a smaller distance_map_px or fewer vsls, or adaptive = false";
         return Err(field.key("distance_map_px").invalid(distance_map_px, expected, remedy));
     }
     let target_error = *config.target_error.get_or_insert(d.target_error);
@@ -80,7 +83,7 @@ pub(super) fn streaming(
         latency_ms: field
             .key("latency_ms")
             .number(latency_ms, "a time from 0 to 60000 ms", |x| (0.0..=60_000.0).contains(&x))?,
-        adaptive: *config.adaptive.get_or_insert(d.adaptive),
+        adaptive,
     })
 }
 

@@ -69,7 +69,12 @@ impl Chosen<'_> {
             )?;
         }
         self.write_lights(out)?;
-        writeln!(out, "[streaming]\nvsls = {}\npool_paths = {}\n", self.vsls, pool_paths(self.vsls))?;
+        writeln!(
+            out,
+            "[streaming]\nvsls = {}\npool_paths = {}\nadaptive = true\n",
+            self.vsls,
+            pool_paths(self.vsls)
+        )?;
         writeln!(out, "[render]\nwidth_px = {}\nheight_px = {}", size.0, size.1)?;
         writeln!(out, "visibility = \"octahedral\"\nexposure_ev = {:?}", self.exposure_ev)
     }
