@@ -33,6 +33,9 @@ pub struct Args {
     /// Load the config once: later changes of the file change nothing
     #[arg(long)]
     pub no_watch: bool,
+    /// Show virtual surface lights that move where they are at once, instead of fading over for a second
+    #[arg(long)]
+    pub no_fade: bool,
     /// Settings that override the config's
     #[command(flatten)]
     pub overrides: Overrides,
@@ -56,6 +59,9 @@ pub struct Overrides {
     /// Hold an animated scene at this moment, in seconds
     #[arg(long, value_name = "SECONDS")]
     pub time: Option<f64>,
+    /// Whether virtual surface lights move to where the light is
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
+    pub adaptive: Option<bool>,
     /// Texels along the edge of the virtual surface lights' distance maps, for visibility octahedral: 0 (none), 8, 16, 32,
     /// 64, or `auto` (32, fewer for more than 32 768 lights)
     #[arg(long, value_name = "PX")]
@@ -113,6 +119,7 @@ impl Overrides {
         streaming.pool_paths = self.pool.or(streaming.pool_paths);
         streaming.seed = self.seed.or(streaming.seed);
         streaming.sampling = self.sampling.or(streaming.sampling);
+        streaming.adaptive = self.adaptive.or(streaming.adaptive);
         match self.distance_map_px {
             Some(MapEdge::Px(px)) => streaming.distance_map_px = Some(px),
             Some(MapEdge::Auto) => {
@@ -139,6 +146,7 @@ impl Overrides {
         add("pool", self.pool.map(|v| v.to_string()));
         add("seed", self.seed.map(|v| v.to_string()));
         add("distance-map-px", self.distance_map_px.map(|px| px.to_string()));
+        add("adaptive", self.adaptive.map(|v| v.to_string()));
         add("sampling", self.sampling.map(|v| v.name().to_owned()));
         arguments
     }
@@ -190,6 +198,7 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         channel: args.channel.clone(),
         threads: args.threads.map(|t| t as usize),
         after_paths: args.after,
+        has_no_fade: args.no_fade,
         config: (!args.no_watch).then_some(source),
     };
     service::run(simulation, &options, &stop)

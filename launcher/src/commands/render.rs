@@ -157,7 +157,10 @@ impl Simulated<'_> {
         let mut overrides = look.overrides(self.overrides);
         // What moves without end never comes to rest.
         overrides.time.get_or_insert(0.0);
-        supervisor.start(simulator(self.config, &channel, &overrides, self.after, global))?;
+        let mut simulator = simulator(self.config, &channel, &overrides, self.after, global);
+        // Nobody watches until it has come to rest.
+        simulator.arguments.push("--no-fade".into());
+        supervisor.start(simulator)?;
         let frame = follow::converged_frame(&mut supervisor, &channel);
         supervisor.end();
         remove_channel(&channel);

@@ -109,6 +109,8 @@ pub fn run(
 ) -> Result<DynamicReport, SimulatorError> {
     let mut scene = scene.clone();
     scene.animation = Arc::default();
+    // Measured are changes of light, not lights that move.
+    scene.streaming.adaptive = false;
     let simulation = Simulation::new(Arc::new(scene));
     let rays = simulation.fill().counters().rays;
     if rays == 0 {
@@ -222,6 +224,7 @@ impl Follower {
             channel: channel.clone(),
             threads: Some(threads()),
             after_paths: None,
+            has_no_fade: false,
             config: None,
         };
         let (stop, stopped) = flume::bounded(1);

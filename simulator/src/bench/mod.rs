@@ -48,7 +48,7 @@ pub fn run(
 ) -> Result<BenchReport, SimulatorError> {
     progress("placing virtual surface lights");
     let begun = Instant::now();
-    let simulation = Simulation::new(scene);
+    let simulation = Simulation::new(with_still_lights(&scene));
     let placement_s = begun.elapsed().as_secs_f64();
     progress("recording rays");
     let recording = parts::Recording::new(&simulation, options.paths)?;
@@ -72,6 +72,13 @@ pub fn run(
     Ok(BenchReport::new(&simulation, placement_s, one, all, &parts, exchange))
 }
 
+/// The scene with virtual surface lights that stay where they are placed: measured is light that changes, not lights that move.
+fn with_still_lights(scene: &Scene) -> Arc<Scene> {
+    let mut scene = Scene::clone(scene);
+    scene.streaming.adaptive = false;
+    Arc::new(scene)
+}
+
 /// Runs the whole service, fresh samples without end, for a while and returns its rates.
 fn stream(simulation: &Simulation, threads: usize, time: Duration) -> Result<Throughput, SimulatorError> {
     let mut scene = Scene::clone(&simulation.scene);
@@ -81,6 +88,7 @@ fn stream(simulation: &Simulation, threads: usize, time: Duration) -> Result<Thr
         channel: exchange::channel("stream")?,
         threads: Some(threads),
         after_paths: None,
+        has_no_fade: false,
         config: None,
     };
     let (stop, stopped) = flume::bounded(1);

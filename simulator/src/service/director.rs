@@ -37,6 +37,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Rest after this many paths.
     pub after_paths: Option<u64>,
+    /// Virtual surface lights that move are shown where they are at once.
+    pub has_no_fade: bool,
     /// Where the scene comes from: it is loaded again when it changes there. `None`: it stays.
     pub config: Option<ConfigSource>,
 }

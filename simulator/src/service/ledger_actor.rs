@@ -111,6 +111,8 @@ pub(super) struct LedgerActor {
     pub(super) emptied: Arc<ArrayQueue<PlacedRecords>>,
     /// Stop handing out work after this many paths.
     pub(super) after_paths: Option<u64>,
+    /// Lights that move are shown where they are at once.
+    pub(super) has_no_fade: bool,
     /// Publish the first version only once its light is whole, as [`Version::only_whole`].
     pub(super) only_whole: bool,
     pub(super) director: flume::Sender<FromLedger>,
@@ -336,7 +338,7 @@ impl LedgerActor {
             ToLedger::Edit(version, reply) => {
                 // Whoever asked does not wait while the pool is moved to other lights.
                 let _ = reply.send(progress.frames + 1);
-                progress.edit(*version);
+                progress.edit(*version, self.has_no_fade);
             }
             ToLedger::Query(reply) => {
                 // Whoever asked may have gone.

@@ -93,6 +93,7 @@ impl Director {
             snapshots: snapshot_sender,
             emptied,
             after_paths: options.after_paths,
+            has_no_fade: options.has_no_fade,
             only_whole: scene.streaming.fixed_step_ms.is_some() && !scene.animation.is_empty(),
             director: tell_director,
         };

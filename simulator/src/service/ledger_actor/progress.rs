@@ -20,7 +20,7 @@ pub(super) struct Placed {
 
 impl Progress {
     /// Goes on in a new version of the scene. Batches under way stay those of the old one.
-    pub(super) fn edit(&mut self, version: Version) {
+    pub(super) fn edit(&mut self, version: Version, has_no_fade: bool) {
         let Version { simulation, still, asked, time_s, only_whole } = version;
         let (received_ns, moved) = match asked {
             Asked::At(received_ns) => (Some(received_ns), None),
@@ -42,7 +42,7 @@ impl Progress {
             self.places += 1;
             self.placements += 1;
             let migration = Migration::between(&self.simulation, &simulation);
-            let numbers = moved.as_ref().and_then(|moved| moved.numbers.clone());
+            let numbers = moved.as_ref().filter(|_| !has_no_fade).and_then(|moved| moved.numbers.clone());
             let migration = match numbers {
                 Some(_) => migration.fading_from(&self.simulation),
                 None => migration,
