@@ -28,8 +28,8 @@ impl Default for PhantomSettings {
 /// A virtual light where the axis of one spot light meets the scene, instead of the static VPLs.
 ///
 /// What it needs to know of the surface is interpolated from the static VPLs, so that one ray against a rough proxy of
-/// the scene is enough. It stands for the interpolated area in the brightness of the beam's axis, also where the beam
-/// is narrower than that: a spot close to a wall looks brighter than it should.
+/// the scene is enough. It stands for the interpolated area in the brightness of the beam's axis, whatever the beam's
+/// width: where the beam is narrower (a spot close to a wall) it is brighter than it should be, where wider, darker.
 ///
 /// Source: paper B §4.3.
 #[derive(Clone, Debug, Default)]

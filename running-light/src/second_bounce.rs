@@ -34,7 +34,7 @@ impl SecondBounce {
     /// The second bounce of static VPLs with the fluxes that [`crate::update`] gave them under `light`: at the mean of
     /// their positions, d_sec against the light's direction, facing against the mean of their normals, with
     /// ρ_ave/d_sec² of the mean of their fluxes; means are weighted by intensity (brightest channel). `None` if none
-    /// shines.
+    /// shines. The mean, not the sum: the more VPLs share the light, the darker it is.
     ///
     /// The paper has one light: with several, update and call this for each alone. A point light has no direction; the
     /// one from it to the mean position is taken.
@@ -52,13 +52,12 @@ impl SecondBounce {
         let (mut sum, mut position, mut normal, mut colour) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
         for (vpl, &flux) in vpls.iter().zip(flux) {
             let share = flux.max_element() / brightest;
-            if share > 0.0 {
-                sum += share;
-                position += vpl.position * share;
-                normal += vpl.normal * share;
-                colour += flux * share;
-            }
+            sum += share;
+            position += vpl.position * share;
+            normal += vpl.normal * share;
+            colour += flux * share;
         }
+        // Without any light the shares are 0/0, and the sum is not a number.
         if sum > 0.0 {
             let (position, colour) = (position / sum, colour / sum);
             let normal = normal.try_normalize();

@@ -173,3 +173,29 @@ fn flux_has_no_jumps_while_the_beam_crosses_vpls() {
     let (coarse, fine) = (largest_change(1_000), largest_change(2_000));
     assert!(coarse > 0.0 && fine <= 0.6 * coarse, "{coarse} in 1000 steps, {fine} in 2000");
 }
+
+/// A phantom that reflects ρ A cosθ/d² = 2 · 3/2² = 1.5 sr of the largest intensity: 1.5 times the largest number.
+#[test]
+fn flux_beyond_f32_is_the_largest() {
+    let bright = Spot { intensity: Vec3::new(f32::MAX, 1.0, 0.0), ..torch() };
+    let vpls = [vpl(0.0, Vec3::Y, Vec3::splat(2.0), 3.0)];
+    let light = Phantom::new().update(&bright, Some(Vec3::ZERO), &vpls, &SETTINGS, 0.0).unwrap();
+    assert_eq!(light.flux.x, f32::MAX);
+    assert!((light.flux.y - 1.5).abs() < 1e-6 && light.flux.z == 0.0, "{}", light.flux);
+}
+
+/// A way that is longer than the largest number is jumped, because it cannot be followed.
+#[test]
+fn ways_beyond_f32_are_jumped() {
+    let (from, to) = (Vec3::X * f32::MAX, Vec3::NEG_X * f32::MAX);
+    let mut state = State { position: from, normal: Vec3::Y, reflected: Vec3::ONE, area: 1.0 };
+    assert!(state.towards(State { position: to, ..state }, 0.5).is_none());
+    state.position = Vec3::ZERO;
+    assert_eq!(state.towards(State { position: to, ..state }, 0.5).unwrap().position, to * 0.5);
+    let far = [from, to].map(|position| Vpl { position, ..two()[0] });
+    assert_eq!(
+        Phantom::new().update(&torch(), Some(Vec3::ZERO), &far, &SETTINGS, 0.0),
+        None,
+        "none in reach"
+    );
+}

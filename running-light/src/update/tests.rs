@@ -98,6 +98,16 @@ fn culled_vpls_are_zero_and_listed_nowhere() {
     assert_eq!(&active[..shining], [VplId(0), VplId(1), VplId(3)], "without light nothing shines");
 }
 
+/// Two lights of 0.75 times the largest irradiance are as bright as the largest: a reflectance of 10⁻¹⁰ makes 10⁻¹⁰ of
+/// it, and one of 0 nothing.
+#[test]
+fn sums_beyond_f32_are_the_largest() {
+    let sun = Light::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::splat(0.75 * f32::MAX) };
+    let vpl = Vpl { albedo: Vec3::new(1.0, 1e-10, 0.0), ..floor(0.0) };
+    let [flux] = flux_of([vpl], &[sun, sun], Visibility::None, ALL);
+    assert_eq!(flux, Vec3::new(f32::MAX, f32::MAX * 1e-10, 0.0));
+}
+
 /// A blocker of radius 1 passes half a metre from the way: a quarter of 1 W. Attached to something, it moves with it:
 /// in the way, beside it, and above the lamp, from where it does not reach back to it.
 #[test]
