@@ -190,6 +190,16 @@ impl Moved {
     }
 }
 
+/// Whether an object has the same triangles, at rest, as one of another scene, in their order.
+pub(crate) fn has_same_mesh(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bool {
+    old.triangles.len() == new.triangles.len()
+        && old
+            .triangles
+            .clone()
+            .zip(new.triangles.clone())
+            .all(|(a, b)| before.geometry.rest_triangle(a) == after.geometry.rest_triangle(b))
+}
+
 /// Whether a path that hits an object is reflected as it was in another version.
 pub(crate) fn reflects_alike(old: &Scene, before: &Object, new: &Scene, after: &Object) -> bool {
     let (before_of, after_of) =

@@ -2,7 +2,7 @@
 //! and whoever embeds the simulator.
 
 use crate::{
-    budgets::{Budgets, Densities},
+    budgets::Budgets,
     cancel::Cancel,
     change::Moved,
     emitters::{Emitters, LightSlots},
@@ -45,16 +45,21 @@ impl Simulation {
     /// [`Simulation::new`], or `None` soon after it was cancelled. Who owns what is kept where the process keeps things
     /// ([`photonstream_scene::kept`]).
     pub fn new_unless(scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        Self::made(scene, &Densities::default(), OwnerCache::of_this_process(), cancel)
+        Self::made(scene, None, OwnerCache::of_this_process(), cancel)
     }
 
     fn made(
         scene: Arc<Scene>,
-        densities: &Densities,
+        base: Option<&Self>,
         cache: Option<&OwnerCache>,
         cancel: &Cancel,
     ) -> Option<Self> {
-        let placement = Placement::new_unless(&scene, densities, cancel)?;
+        let are_adaptive = |base: &&Self| base.scene.streaming.adaptive && scene.streaming.adaptive;
+        let placement = match base.filter(are_adaptive) {
+            // What has the same name is probably lit alike.
+            Some(base) => base.placement.followed_unless(&base.scene, &scene, cancel)?,
+            None => Placement::new_unless(&scene, cancel)?,
+        };
         let emitters = Arc::new(Emitters::new(&scene));
         Self::of_placement(scene, placement, emitters, cache, cancel)
     }
@@ -143,21 +148,13 @@ impl Simulation {
 
     /// [`Simulation::reloaded`], or `None` soon after it was cancelled.
     pub fn reloaded_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        let densities = self.densities_for(&scene);
-        Some(Self::made(scene, &densities, None, cancel)?.with_split_of(self))
+        Some(Self::made(scene, Some(self), None, cancel)?.with_split_of(self))
     }
 
     /// [`Simulation::reloaded_unless`], with who owns what kept as by [`Simulation::new_unless`]: for scenes that may come again.
     pub(crate) fn reloaded_and_kept_unless(&self, scene: Arc<Scene>, cancel: &Cancel) -> Option<Self> {
-        let densities = self.densities_for(&scene);
         let cache = OwnerCache::of_this_process();
-        Some(Self::made(scene, &densities, cache, cancel)?.with_split_of(self))
-    }
-
-    /// How dense lights lie on what `scene` has of the same name, where both are adaptive: it is probably lit alike.
-    fn densities_for(&self, scene: &Scene) -> Densities {
-        let are_adaptive = self.scene.streaming.adaptive && scene.streaming.adaptive;
-        if are_adaptive { Densities::of(&self.scene, &self.placement) } else { Densities::default() }
+        Some(Self::made(scene, Some(self), cache, cancel)?.with_split_of(self))
     }
 
     /// A ledger with an empty pool.

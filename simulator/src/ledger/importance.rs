@@ -22,7 +22,8 @@ impl Ledger {
     /// number of threads.
     pub fn reaching_watts(&self, scene: &Scene, placement: &Placement) -> Vec<f64> {
         let mut watts = vec![0.0; placement.surfaces.len()];
-        let scales = self.scales(scene);
+        let scales = self.pool_scales(scene);
+        let index = surface_index(scene, placement);
         for light in &self.emitters.lights {
             let scale = &scales[light.column as usize];
             if scale.watts == Vec3::ZERO {
@@ -33,7 +34,8 @@ impl Ledger {
                 let paths = Vec3::from(quanta.map(|quanta| (quanta as f64 * per_path) as f32));
                 f64::from(luminance(paths * scale.watts))
             };
-            for (watts, left) in watts.iter_mut().zip(self.left_by(light.slots.clone(), scene, placement)) {
+            let left = self.left_by(light.slots.clone(), scene, &index, watts.len());
+            for (watts, left) in watts.iter_mut().zip(left) {
                 let (reaching, lost) = (weigh(left.reaching), weigh(left.lost));
                 if reaching > 0.0 {
                     *watts += weigh(left.all) * reaching / (reaching + lost);
@@ -44,15 +46,20 @@ impl Ledger {
     }
 
     /// What the paths in `slots` have left on each surface.
-    fn left_by(&self, slots: std::ops::Range<u32>, scene: &Scene, placement: &Placement) -> Vec<Left> {
-        let index = surface_index(scene, placement);
-        let none = || vec![Left::default(); placement.surfaces.len()];
+    fn left_by(
+        &self,
+        slots: std::ops::Range<u32>,
+        scene: &Scene,
+        index: &[[u32; 2]],
+        surfaces: usize,
+    ) -> Vec<Left> {
+        let none = || vec![Left::default(); surfaces];
         let starts: Vec<u32> = slots.clone().step_by(PATHS_LOOKED_AT).collect();
         starts
             .into_par_iter()
             .fold(none, |mut sums, start| {
                 for slot in start..slots.end.min(start + PATHS_LOOKED_AT as u32) {
-                    self.add(slot, scene, &index, &mut sums);
+                    self.add(slot, scene, index, &mut sums);
                 }
                 sums
             })

@@ -7,7 +7,7 @@
 
 use super::{FILLED, Ledger, STALE, UNDER_WAY};
 use crate::{
-    change::{ALL, LightRevision, at_most, obstacle, reach_of, reflects_alike},
+    change::{ALL, LightRevision, at_most, has_same_mesh, obstacle, reach_of, reflects_alike},
     disturbance::Disturbance,
     flux::Deposit,
     owner::OwnerTable,
@@ -62,7 +62,8 @@ impl Migration {
                 Some((index, revision))
             })
             .collect();
-        let same_owners = old.placement == new.placement && triangles.iter().zip(0..).all(|(&t, i)| t == i);
+        let are_same = Arc::ptr_eq(&old.owners, &new.owners) || old.placement == new.placement;
+        let same_owners = are_same && triangles.iter().zip(0..).all(|(&t, i)| t == i);
         Self { lights, triangles, disturbance, same_owners, fades_from: None }
     }
 
@@ -106,15 +107,6 @@ fn objects(before: &Scene, after: &Scene) -> (Vec<u32>, Disturbance) {
     (triangles, Disturbance::new(touched, obstacles))
 }
 
-fn has_same_mesh(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bool {
-    old.triangles.len() == new.triangles.len()
-        && old
-            .triangles
-            .clone()
-            .zip(new.triangles.clone())
-            .all(|(a, b)| before.geometry.rest_triangle(a) == after.geometry.rest_triangle(b))
-}
-
 fn stands_alike(before: &Scene, old: &Object, after: &Scene, new: &Object) -> bool {
     old.triangles
         .clone()
@@ -127,7 +119,7 @@ impl Ledger {
     /// they come.
     ///
     /// `budget` is that of [`Ledger::revise`].
-    pub fn migrate(self, migration: &Migration, simulation: &Simulation, budget: Option<u32>) -> Self {
+    pub fn migrate(mut self, migration: &Migration, simulation: &Simulation, budget: Option<u32>) -> Self {
         let mut next = simulation.ledger();
         next.version = self.version + 1;
         next.structure = self.structure + 1;
@@ -135,6 +127,7 @@ impl Ledger {
         (next.counters, next.savings) = (self.counters, self.savings);
         if let Some((owners, vsls)) = &migration.fades_from {
             next.pool.sum_also(Arc::clone(owners), *vsls);
+            next.refined_before = Some(std::mem::replace(&mut self.refinement, next.refinement.clone()));
         }
         let is_replay = next.given.is_empty();
         let mut moved = Moved::default();

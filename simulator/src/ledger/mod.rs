@@ -110,6 +110,8 @@ pub struct Ledger {
     waiting: BTreeMap<u64, (Task, PathBatch, u32)>,
     counters: Counters,
     refinement: Refinement,
+    /// That of the lights from which the present ones fade.
+    refined_before: Option<Refinement>,
     /// Nothing is refined for now.
     holds: bool,
     /// Watts per unit of each column.
@@ -148,6 +150,7 @@ impl Ledger {
                 vsls,
                 &emitters,
             ),
+            refined_before: None,
             holds: false,
             watts: emitters.column_watts(scene),
             emitters,
@@ -178,6 +181,9 @@ impl Ledger {
             }
             if revision.factor != Vec3::ONE || change.may_concern(index) {
                 self.refinement.reset(light.column as usize, self.version);
+                if let Some(before) = &mut self.refined_before {
+                    before.reset(light.column as usize, self.version);
+                }
             }
         }
         let concerned: Vec<bool> = (0..change.lights.len()).map(|light| change.may_concern(light)).collect();
@@ -336,8 +342,8 @@ impl Ledger {
         self.empty == 0 && self.stale_paths == 0
     }
 
-    /// Whether to add no samples beyond the pool for now, and not to count as converged: the virtual surface lights will be
-    /// others soon, which have to be refined from the pool on.
+    /// Whether to add no samples beyond the pool for now: the virtual surface lights may be others soon, which have to be
+    /// refined from the pool on.
     pub fn hold_refinement(&mut self, holds: bool) {
         self.holds = holds;
     }
@@ -347,7 +353,6 @@ impl Ledger {
     pub fn is_converged(&self) -> bool {
         let is_traced = self.is_settled() && self.is_full();
         is_traced
-            && !self.holds
             && (self.sampling == Sampling::Fresh || (self.in_flight() == 0 && self.refinement.is_done()))
     }
 

@@ -1,6 +1,6 @@
 //! Turns the sums of pool and refinement into the flux of every virtual surface light.
 
-use super::{FILLED, Ledger};
+use super::{FILLED, Ledger, refinement::Refinement};
 use crate::{
     emitters::LightSlots,
     flux::{ColumnScale, FluxReading},
@@ -55,19 +55,31 @@ impl Ledger {
         (0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales))
     }
 
-    /// The flux of the lights from which those of this ledger fade ([`super::Migration::fading_from`]), in their order; `None`
-    /// where they do not. Only the pool's paths are in it.
+    /// The flux of the lights from which those of this ledger fade ([`super::Migration::fading_from`]), in their order, with
+    /// what had been refined of it; `None` where they do not.
     pub fn readings_before(&self, scene: &Scene) -> Option<impl Iterator<Item = FluxReading>> {
         let flux = self.pool.also()?;
-        let mut scales = self.scales(scene);
+        let refined = self.refined_before.as_ref();
+        let mut scales = self.pool_scales(scene);
         for (column, scale) in scales.iter_mut().enumerate() {
-            scale.paths -= self.refinement.paths(column);
+            scale.paths += refined.map_or(0, |refined| refined.paths(column));
         }
-        Some((0..flux.vsls() as u32).map(move |vsl| flux.read(vsl, &scales)))
+        let more = refined.and_then(Refinement::flux);
+        Some((0..flux.vsls() as u32).map(move |vsl| flux.read_with(more, vsl, &scales)))
     }
 
     /// Sums no other lights' flux any more.
     pub fn end_fade(&mut self) {
         self.pool.forget_also();
+        self.refined_before = None;
+    }
+
+    /// As [`Ledger::scales`], of the paths in the pool alone.
+    pub(super) fn pool_scales(&self, scene: &Scene) -> Vec<ColumnScale> {
+        let mut scales = self.scales(scene);
+        for (column, scale) in scales.iter_mut().enumerate() {
+            scale.paths -= self.refinement.paths(column);
+        }
+        scales
     }
 }

@@ -18,6 +18,7 @@ mod thin;
 use crate::{
     budgets::Densities,
     cancel::Cancel,
+    change::has_same_mesh,
     owner::OwnerTable,
     patch::{self, Patch},
     vsl::{Surface, Vsl},
@@ -52,10 +53,10 @@ impl Placement {
         Self::with(scene, settings.vsls, settings.seed, settings.placement_scale, OVERSAMPLING)
     }
 
-    /// [`Placement::new`], or `None` soon after it was cancelled; as dense on each surface as `densities` say.
-    pub(crate) fn new_unless(scene: &Scene, densities: &Densities, cancel: &Cancel) -> Option<Self> {
+    /// [`Placement::new`], or `None` soon after it was cancelled.
+    pub fn new_unless(scene: &Scene, cancel: &Cancel) -> Option<Self> {
         let settings = &scene.streaming;
-        let shares = share::by_area(scene, settings.vsls, densities);
+        let shares = share::by_area(scene, settings.vsls, &Densities::default());
         let method = (settings.seed, settings.placement_scale, OVERSAMPLING);
         cancel.or(Self::of_shares(scene, &shares, method, cancel))
     }
@@ -107,20 +108,37 @@ impl Placement {
     /// If there are not as many shares as surfaces.
     pub fn with_shares_unless(&self, scene: &Scene, shares: &[u32], cancel: &Cancel) -> Option<Self> {
         assert_eq!(shares.len(), self.surfaces.len(), "one share for each surface");
-        let settings = &scene.streaming;
-        let placed = self.surfaces.par_iter().zip(shares).map(|((surface, lights), &share)| {
-            let mut points: Vec<Vsl> = self.vsls[lights.start as usize..lights.end as usize].to_vec();
-            points.iter_mut().for_each(|point| point.area = 0.0);
-            let (there, scale) = (points.len(), settings.placement_scale);
-            if share as usize > there {
-                // Where a point was drawn before, its light is in the way: it is the first to go.
-                let drawn = (f64::from(share) * OVERSAMPLING).ceil() as u32;
-                points.extend(draw::points(scene, *surface, share, drawn, settings.seed, scale));
-            }
-            let fixed = if share as usize >= there { there } else { 0 };
-            (*surface, thin::to(&scene.geometry, points, fixed, share as usize, cancel))
+        let placed = self.surfaces.par_iter().zip(shares).map(|((surface, lights), &vsls)| {
+            let there = self.vsls[lights.start as usize..lights.end as usize].to_vec();
+            (*surface, with_share(scene, Share { surface: *surface, vsls }, there, cancel))
         });
         cancel.or(Self::of_surfaces(placed.collect()))
+    }
+
+    /// The placement of another scene that is as dense as this one, of `before`, on what has the same name; where it has the
+    /// same mesh, too, lights stay as in [`Placement::with_shares_unless`].
+    pub(crate) fn followed_unless(&self, before: &Scene, scene: &Scene, cancel: &Cancel) -> Option<Self> {
+        let shares = share::by_area(scene, scene.streaming.vsls, &Densities::of(before, self));
+        let placed = shares.par_iter().map(|share| {
+            let there = self.lights_of_same_mesh(before, scene, share.surface);
+            (share.surface, with_share(scene, *share, there, cancel))
+        });
+        cancel.or(Self::of_surfaces(placed.collect()))
+    }
+
+    /// The lights on the surface of `before` that is called as `on` and has its mesh, on that; else none.
+    fn lights_of_same_mesh(&self, before: &Scene, scene: &Scene, on: Surface) -> Vec<Vsl> {
+        let new = &scene.objects[on.object.0 as usize];
+        let Some(object) = before.object(&new.name) else { return Vec::new() };
+        let old = &before.objects[object.0 as usize];
+        let was = Surface { object, side: on.side };
+        let found = self.surfaces.iter().find(|(surface, _)| *surface == was);
+        let Some((_, lights)) = found.filter(|_| has_same_mesh(before, old, scene, new)) else {
+            return Vec::new();
+        };
+        let number = |triangle: u32| triangle - old.triangles.start + new.triangles.start;
+        let lights = &self.vsls[lights.start as usize..lights.end as usize];
+        lights.iter().map(|vsl| Vsl { surface: on, triangle: number(vsl.triangle), ..*vsl }).collect()
     }
 
     /// Gives each light the area of its Voronoi cell on its surface, the set of points that it owns, and the polygon that
@@ -134,4 +152,18 @@ impl Placement {
         }
         self.patches = cells.into_iter().map(|(_, patch)| patch).collect();
     }
+}
+
+/// So many lights as `share` says, by adding to those that are `there`, or taking from them.
+fn with_share(scene: &Scene, share: Share, mut there: Vec<Vsl>, cancel: &Cancel) -> Vec<Vsl> {
+    let (settings, wanted) = (&scene.streaming, share.vsls as usize);
+    there.iter_mut().for_each(|light| light.area = 0.0);
+    let fixed = if wanted >= there.len() { there.len() } else { 0 };
+    if wanted > there.len() {
+        // Where a point was drawn before, its light is in the way: it is the first to go.
+        let drawn = (f64::from(share.vsls) * OVERSAMPLING).ceil() as u32;
+        let scale = settings.placement_scale;
+        there.extend(draw::points(scene, share.surface, share.vsls, drawn, settings.seed, scale));
+    }
+    thin::to(&scene.geometry, there, fixed, wanted, cancel)
 }

@@ -1,6 +1,8 @@
 //! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
 
 mod fade;
+mod messages;
+mod moves;
 mod progress;
 mod telemetry;
 
@@ -15,83 +17,21 @@ use super::{
 use crate::{
     change::Change as SceneChange,
     counters::Counters,
-    distance_maps::{Schedule, Traced},
-    ledger::{Ledger, Task},
-    placement::Placement,
+    distance_maps::Schedule,
+    ledger::Ledger,
     records,
     simulation::Simulation,
     tracer::{PathBatch, Tracer},
 };
 use crossbeam::queue::ArrayQueue;
 use fade::Fade;
+pub(super) use messages::{Asked, Change, FromLedger, LightsWanted, ToLedger, Version};
+use moves::Moves;
 use photonstream_protocol::monotonic_ns;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-
-/// What reaches the ledger.
-pub(super) enum ToLedger {
-    /// A tracer has finished a task.
-    Finished(Box<(Task, PathBatch)>),
-    /// A tracer has traced the distance map of a virtual surface light.
-    Mapped(Box<Traced>),
-    /// Change what is done; the answer is the number of the first frame that shows it.
-    Change(Change, flume::Sender<u64>),
-    /// Go on in a new version of the scene; the answer is the number of the first frame that shows it.
-    Edit(Box<Version>, flume::Sender<u64>),
-    /// Tell the present state.
-    Query(flume::Sender<State>),
-    /// End.
-    Stop,
-}
-
-/// A new version of the scene.
-pub(super) struct Version {
-    pub(super) simulation: Simulation,
-    pub(super) still: Arc<Still>,
-    /// Who wanted it.
-    pub(super) asked: Asked,
-    /// Time of the simulated scene, s.
-    pub(super) time_s: f64,
-    /// Publish it only once its light is whole: time goes on in fixed steps.
-    pub(super) only_whole: bool,
-}
-
-/// Who wants a version of the scene.
-pub(super) enum Asked {
-    /// Somebody, by an edit that arrived then, monotonic ns.
-    At(u64),
-    /// The ledger: the scene is the same, with lights elsewhere.
-    Nobody(Moved),
-}
-
-/// What the ledger tells of itself.
-pub(super) enum FromLedger {
-    /// A frame of the whole light of a version was published.
-    Settled(u64),
-    /// Lights had better lie elsewhere.
-    Wants(LightsWanted),
-}
-
-/// Where lights had better lie.
-pub(super) struct LightsWanted {
-    /// Instead of here.
-    pub(super) placement: Arc<Placement>,
-    /// The number on each of its surfaces.
-    pub(super) shares: Vec<u32>,
-}
-
-/// What the ledger can be told to do.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Change {
-    /// Stop handing out work.
-    Pause,
-    /// Go on.
-    Resume,
-    /// While paused: go on until the next frame.
-    Step,
-}
 
 /// A frame that is to be shown whole is shown after this time all the same.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
@@ -158,10 +98,13 @@ struct Progress {
     changed: bool,
     /// Paths were traced since it was last decided how the pool is split.
     split_is_due: bool,
-    /// Something has changed since it was last decided where virtual surface lights lie.
-    budgets_are_due: bool,
+    /// Where virtual surface lights are to lie.
+    moves: Moves,
     /// They come from where they were.
     fade: Option<Fade>,
+    /// The last frame was of a simulation that goes on, and of the whole light.
+    shown_running: bool,
+    shown_whole: bool,
     next_frame: Instant,
     /// When the last frame was shown, or the first change after it came.
     shown_at: Instant,
@@ -204,8 +147,10 @@ impl LedgerActor {
             stepping: false,
             changed: true,
             split_is_due: true,
-            budgets_are_due: true,
+            moves: Moves::new(started),
             fade: None,
+            shown_running: true,
+            shown_whole: false,
             next_frame: started + period(&self.simulation),
             shown_at: started,
             frames: 0,
@@ -215,6 +160,7 @@ impl LedgerActor {
             active: Duration::ZERO,
             active_since: None,
         };
+        progress.hold_or_refine();
         loop {
             if !self.hand_out(&mut progress) {
                 break;
@@ -236,9 +182,17 @@ impl LedgerActor {
                     Published::Gone => break,
                 }
             }
+            self.tell(&mut progress);
+            let decision = progress.next_decision();
             let message = if progress.changed {
                 let late = progress.shown_at + LONGEST_WAIT;
                 let due = if may_be_shown { progress.next_frame } else { late };
+                match self.inbox.recv_deadline(due) {
+                    Ok(message) => message,
+                    Err(flume::RecvTimeoutError::Timeout) => continue,
+                    Err(flume::RecvTimeoutError::Disconnected) => break,
+                }
+            } else if let Some(due) = decision {
                 match self.inbox.recv_deadline(due) {
                     Ok(message) => message,
                     Err(flume::RecvTimeoutError::Timeout) => continue,
@@ -257,14 +211,27 @@ impl LedgerActor {
         progress.ledger.counters()
     }
 
+    /// Once a frame is out, tells the director what follows from it: that lights had better lie elsewhere, before that its
+    /// light was whole, so that in fixed steps of time the former comes first.
+    fn tell(&self, progress: &mut Progress) {
+        if progress.changed {
+            return;
+        }
+        if let Some(wish) = progress.follow_light() {
+            // Whoever does not listen does not move lights.
+            let _ = self.director.send(FromLedger::Wants(wish));
+        }
+        if progress.unsettled && progress.shown_whole {
+            progress.unsettled = false;
+            // Whoever does not listen does not wait for it.
+            let _ = self.director.send(FromLedger::Settled(progress.versions));
+        }
+    }
+
     /// Keeps the tracers busy. False if there are none any more.
     fn hand_out(&self, progress: &mut Progress) -> bool {
         if !progress.paused && !self.is_at_limit(progress) {
             progress.follow_variance();
-            if let Some(wish) = progress.follow_light() {
-                // Whoever does not listen does not move lights.
-                let _ = self.director.send(FromLedger::Wants(wish));
-            }
         }
         let room = 2 * self.threads as u64 + 2;
         let has_maps = progress.maps.as_ref().is_some_and(|maps| !maps.is_whole());
@@ -303,7 +270,7 @@ impl LedgerActor {
     fn is_done(&self, progress: &Progress) -> bool {
         let ledger = &progress.ledger;
         let rests = self.is_at_limit(progress) && ledger.in_flight() == 0 && ledger.stale_paths() == 0;
-        (ledger.is_done() || rests) && progress.has_whole_maps() && progress.fade.is_none()
+        (ledger.is_done() || rests) && progress.has_whole_maps() && progress.has_lights_at_rest()
     }
 
     /// False where it is time to end.
@@ -340,6 +307,12 @@ impl LedgerActor {
                 let _ = reply.send(progress.frames + 1);
                 progress.edit(*version, self.has_no_fade);
             }
+            ToLedger::Time(time_s) => {
+                progress.time_s = time_s;
+                // What fades goes on with time; else there is nothing to be shown.
+                progress.changed |= progress.fade.is_some();
+                progress.unsettled = true;
+            }
             ToLedger::Query(reply) => {
                 // Whoever asked may have gone.
                 let _ = reply.send(self.state(progress));
@@ -374,10 +347,17 @@ impl LedgerActor {
         let still = Arc::clone(&progress.still);
         let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
-        let has_converged = progress.ledger.is_converged() && progress.has_whole_maps();
-        let statistics = self.statistics(progress, converged || has_converged);
+        let statistics = self.statistics(progress, converged || progress.has_converged());
         let maps = progress.maps.as_mut().map(|maps| MapUpdate::of(maps, progress.placements));
-        let snapshot = Snapshot { vsls, patches, maps, still, statistics, paused: progress.paused };
+        let snapshot = Snapshot {
+            room: progress.room(),
+            vsls,
+            patches,
+            maps,
+            still,
+            statistics,
+            paused: progress.paused,
+        };
         if self.snapshots.send(snapshot).is_err() {
             return Published::Gone;
         }
@@ -386,17 +366,14 @@ impl LedgerActor {
         progress.next_frame = now + period(&progress.simulation).max(progress.publishing * PUBLISHING_SHARE);
         progress.frames += 1;
         progress.shown_at = now;
+        progress.shown_running = !progress.paused || progress.stepping;
         progress.stepping = false;
         // While lights fade every frame is another one, and where they go then has to be decided.
         progress.changed = match progress.end_fade_if_over() {
             true => true,
             false => progress.fade.is_some() && !progress.paused && !is_in_steps,
         };
-        if progress.unsettled && progress.is_whole() {
-            progress.unsettled = false;
-            // Whoever does not listen does not wait for it.
-            let _ = self.director.send(FromLedger::Settled(progress.versions));
-        }
+        progress.shown_whole = progress.is_whole();
         Published::Yes
     }
 }

@@ -86,6 +86,12 @@ impl Placements {
         self.under_way.as_ref().is_some_and(|under_way| under_way.wanted.is_animated)
     }
 
+    /// Whether what is to come is the present scene with its lights elsewhere, and nothing else.
+    pub(super) fn are_moves(&self) -> bool {
+        let under_way = self.under_way.iter().map(|under_way| &under_way.wanted);
+        under_way.chain(&self.next).all(|wanted| wanted.shares.is_some() && wanted.waiting.is_empty())
+    }
+
     /// The scenes to come, the newest last.
     pub(super) fn scenes(&self) -> impl Iterator<Item = &Scene> {
         let under_way = self.under_way.iter().map(|under_way| &under_way.wanted.scene);

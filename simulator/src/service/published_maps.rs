@@ -20,6 +20,11 @@ impl MapUpdate {
         Self { placement, lights: maps.len(), each, changed: maps.take_changed() }
     }
 
+    /// Records of so many lights.
+    pub(super) fn records_of(&self, lights: usize) -> usize {
+        lights * self.each
+    }
+
     /// Records of all lights.
     pub(super) fn records(&self) -> usize {
         self.lights * self.each

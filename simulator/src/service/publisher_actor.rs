@@ -21,6 +21,8 @@ use std::{
 
 /// What the ledger wants published.
 pub(super) struct Snapshot {
+    /// Virtual surface lights that there has to be room for.
+    pub(super) room: usize,
     pub(super) vsls: PlacedRecords,
     /// The same allocation for as long as no patch changes.
     pub(super) patches: Arc<[PatchRecord]>,
@@ -193,8 +195,9 @@ impl PublisherActor {
     /// Where there is no room for it, which is then noted; tried again after a while.
     fn make_room(&mut self, snapshot: &Snapshot) -> Result<(), ()> {
         let spec = self.publisher.spec();
-        let distances = snapshot.maps.as_ref().map_or(0, MapUpdate::records);
-        let least = snapshot.still.spec(snapshot.vsls.records.len(), distances, Some(spec));
+        let room = snapshot.room.max(snapshot.vsls.records.len());
+        let distances = snapshot.maps.as_ref().map_or(0, |maps| maps.records_of(room));
+        let least = snapshot.still.spec(room, distances, Some(spec));
         // Only a larger or another scene needs another one: what is too large is kept for the next.
         if least == *spec {
             self.refused = None;

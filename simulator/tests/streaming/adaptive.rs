@@ -269,10 +269,10 @@ fn lights_come_to_rest_before_they_are_refined() {
     let values = json!({ "vsls": 600 }).as_object().unwrap().clone();
     let reply = client.request(&Request::SetStreaming { values }, PATIENCE).unwrap();
     let Reply::Ok { frame } = reply else { panic!("{reply:?}") };
-    // Already in the first frame.
+    // Already in the first frame: 2.77 times as dense in the room as on average, an eighth elsewhere.
     let frame = frame_where(&mut subscriber, frame, |_| {}, |_| true);
     let [room, roof] = ["room", "roof"].map(|name| lights_on(&frame, &expected.scene, name));
-    assert!(frame.vsls.len() == 600 && room.abs_diff(554) <= 2 && roof.abs_diff(23) <= 2, "{room} {roof}");
+    assert!(frame.vsls.len() == 600 && room.abs_diff(550) <= 1 && roof.abs_diff(25) <= 1, "{room} {roof}");
     drop(client);
     service.end();
 }
@@ -287,4 +287,94 @@ fn lights_stay_where_nobody_asks() {
     assert_eq!(lights_on(&frame, &simulation.scene, "room"), 100);
     assert!(simulation.clone().adapted().placement == simulation.placement);
     service.end();
+}
+
+/// What was refined says nothing of where light goes, and changes nothing of it: with two lamps in columns of their own, one of them
+/// refined beyond the other, decisions are those of the pool.
+#[test]
+fn decisions_do_not_depend_on_what_was_refined() {
+    let simulation = Simulation::new(Arc::new(house("adaptive = true\ntarget_error = 0.02")));
+    let mut ledger = simulation.fill();
+    let reaching = |ledger: &Ledger| ledger.reaching_watts(&simulation.scene, &simulation.placement);
+    let before = reaching(&ledger);
+    simulation.advance(&mut ledger, 2000);
+    assert!(ledger.refined_paths() > 4000 && reaching(&ledger) == before);
+}
+
+/// A change while paused is shown as what it is; lights follow when time goes on.
+#[test]
+fn nothing_moves_while_paused() {
+    let simulation = Simulation::new(Arc::new(house("adaptive = true\npublish_period_ms = 1")));
+    let service = start("adaptive-paused", &simulation, 2, None);
+    let mut subscriber = service.attach();
+    let rest = frame_where(&mut subscriber, 0, |_| {}, is_converged);
+    let mut client = service.connect();
+    let mut ask = |request: &Request| match client.request(request, PATIENCE).unwrap() {
+        Reply::Ok { frame } => frame,
+        reply => panic!("{reply:?}"),
+    };
+    ask(&Request::Pause);
+    // A power takes no ray, so that its light is whole while paused.
+    let values = json!({ "position_m": [0.2, -2.9, 0] }).as_object().unwrap().clone();
+    let dimmed = json!({ "power_w": 2 }).as_object().unwrap().clone();
+    let number = ask(&Request::SetLight { name: "sun".into(), values: dimmed });
+    let paused = frame_where(&mut subscriber, number, |_| {}, is_converged);
+    assert!(places(&paused).len() == places(&rest).len() && paused.vsls.len() == 300);
+    ask(&Request::SetLight { name: "lamp".into(), values });
+    let number = ask(&Request::Resume);
+    let moved = frame_where(&mut subscriber, number, |_| {}, is_converged);
+    assert!(lights_on(&moved, &simulation.scene, "cellar") > 260);
+    service.end();
+}
+
+/// A limit of paths is none of moves: with as many as the pool holds, lights move and come to rest.
+#[test]
+fn lights_move_at_the_limit_of_paths() {
+    let simulation = Simulation::new(Arc::new(house("adaptive = true\npublish_period_ms = 1")));
+    let service = start("adaptive-limit", &simulation, 2, Some(4000));
+    let mut subscriber = service.attach();
+    let frame = frame_where(&mut subscriber, 0, |_| {}, is_converged);
+    assert_eq!((lights_on(&frame, &simulation.scene, "room"), frame.vsls.len()), (277, 300));
+    service.end();
+}
+
+/// In fixed steps lights fade with the scene's time; where that stands still or ends before they have, they come to rest all the
+/// same.
+#[test]
+fn fades_end_where_animations_do() {
+    let lamp = "[[animation]]\nlight = \"lamp\"\nproperty = \"position_m\"\nrepeat = \"once\"\n\
+                times_s = [0, 0.3, 0.9]\nvalues = [[0.2, 0.1, 0], [0.2, -2.9, 0], [0.2, -2.9, 0]]\n";
+    let text = format!("adaptive = true\npublish_period_ms = 1\nfixed_step_ms = 50\n{lamp}");
+    let simulation = Simulation::new(Arc::new(house(&text)));
+    let service = start("adaptive-steps", &simulation, 2, None);
+    let mut subscriber = service.attach();
+    let is_over = |frame: &VslFrame| is_converged(frame) && frame.statistics.simulation_time_s >= 0.9;
+    let frame = frame_where(&mut subscriber, 0, |_| {}, is_over);
+    let cellar = lights_on(&frame, &simulation.scene, "cellar");
+    assert!(cellar > 260 && frame.vsls.len() == 300, "{cellar} of {}", frame.vsls.len());
+    service.end();
+}
+
+/// Another version of the scene, here with another room height, finds lights where they lie, on all that is as it was.
+#[test]
+fn a_reload_keeps_the_lights_of_what_stays() {
+    let rest = at_rest(&adaptive());
+    let text = "adaptive = true";
+    let mut changed = house(text);
+    let mut edit = changed.edit();
+    edit.move_object("cellar", json!({ "scale": [1, 0.5, 1] }).as_object().unwrap()).unwrap();
+    changed = edit.finish();
+    let next = rest.reloaded(Arc::new(changed));
+    let on = |simulation: &Simulation, name: &str| -> Vec<(u32, [f32; 2])> {
+        let id = simulation.scene.object(name).unwrap();
+        let lights = simulation.placement.vsls.iter().filter(|vsl| vsl.surface.object == id);
+        lights.map(|vsl| (vsl.triangle, vsl.barycentric)).collect()
+    };
+    // The cellar's smaller area leaves some lights to the others.
+    for name in ["room", "roof"] {
+        let (before, after) = (on(&rest, name), on(&next, name));
+        assert!(before.iter().all(|light| after.contains(light)), "{name}");
+        assert!((before.len()..before.len() + 10).contains(&after.len()), "{name}: {}", after.len());
+    }
+    assert!(on(&next, "cellar").len() < on(&rest, "cellar").len());
 }

@@ -175,7 +175,7 @@ fn a_panic_ends_the_service() {
     let broken = Simulation { tracer, ..large };
     let channel: ChannelName = format!("t{}-panic", std::process::id()).parse().unwrap();
     let (_stop, stopped) = flume::bounded(1);
-    let options = Options { channel: channel.clone(), threads: Some(2), after_paths: None, config: None };
+    let options = Options { channel: channel.clone(), threads: Some(2), ..Options::default() };
     let error = service::run(broken, &options, &stopped).unwrap_err();
     assert!(error.to_string().contains("tracer"), "{error}");
     // Left as a crash leaves it: renderers wait for a successor.

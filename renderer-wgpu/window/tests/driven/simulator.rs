@@ -101,7 +101,7 @@ fn run(scene: &Arc<Scene>, channel: &ChannelName) -> (std::sync::mpsc::Sender<()
             let _ = stopped.recv();
             let _ = sender.send(());
         });
-        let options = Options { channel, threads: Some(1), after_paths: None, config: None };
+        let options = Options { channel, threads: Some(1), ..Options::default() };
         service::run(Simulation::new(scene), &options, &receiver).unwrap();
         bridge.join().unwrap();
     });

@@ -265,7 +265,13 @@ impl Director {
     /// Goes on to `now`.
     pub(super) fn tick(&mut self, now: Instant) {
         self.clock.tick(now);
-        if self.animate() == Motion::Still {
+        if self.animate() != Motion::Still {
+            return;
+        }
+        if self.clock.is_fixed() && self.simulation.scene.streaming.adaptive {
+            // It says when it has shown this instant; if it is gone, that is told by another way.
+            let _ = self.to_ledger.send(ToLedger::Time(self.animated_s));
+        } else {
             // There is nothing to wait for.
             self.clock.settled();
         }
@@ -298,9 +304,9 @@ impl Director {
             return Motion::Still;
         };
         if !self.simulation.has_lights_of(&scene) {
-            // What is awaited is put where it is then.
-            if !self.placements.are_awaited() {
-                self.placements.append(Wanted {
+            // What is awaited is put where it is then; lights that only move have to wait.
+            if !self.placements.are_awaited() || self.placements.are_moves() {
+                self.placements.replace(Wanted {
                     is_animated: true,
                     ..Wanted::version(scene, received_ns, Some(self.clock.time_s()))
                 });

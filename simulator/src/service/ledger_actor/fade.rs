@@ -74,7 +74,7 @@ impl Progress {
         if is_over {
             self.fade = None;
             self.ledger.end_fade();
-            self.budgets_are_due = true;
+            self.moves.are_due();
         }
         is_over
     }

@@ -1,7 +1,7 @@
 //! Turns new versions of the scene into what the ledger goes on with, and the time that changes take into budgets.
 
-use super::{Asked, Fade, LightsWanted, Moved, Progress, SceneChange, Version};
-use crate::{budgets::Budgets, distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
+use super::{Asked, Fade, Moved, Progress, SceneChange, Version};
+use crate::{distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
 use photonstream_protocol::{PatchRecord, monotonic_ns};
 use photonstream_scene::Geometry;
 use std::{
@@ -62,8 +62,8 @@ impl Progress {
         if !self.changed {
             self.shown_at = Instant::now();
         }
-        self.budgets_are_due = true;
-        self.ledger.hold_refinement(self.simulation.scene.streaming.adaptive);
+        self.moves.are_due();
+        self.hold_or_refine();
         if let Some(received_ns) = received_ns {
             self.edit_received_ns = received_ns;
             // An edit that needs no ray is traced with its arrival.
@@ -87,28 +87,6 @@ impl Progress {
             }
             _ => Schedule::new(simulation, self.placements),
         };
-    }
-
-    /// Where the scene is adaptive, and lights had better lie elsewhere, where: decided once after each change, as soon as its
-    /// light is whole. Until they are there nothing is refined.
-    pub(super) fn follow_light(&mut self) -> Option<LightsWanted> {
-        let scene = &self.simulation.scene;
-        let is_ready = self.ledger.is_settled() && self.fade.is_none();
-        if !self.budgets_are_due || !is_ready || !scene.streaming.adaptive {
-            return None;
-        }
-        self.budgets_are_due = false;
-        let placement = &self.simulation.placement;
-        let reaching = self.ledger.reaching_watts(scene, placement);
-        let budgets = Budgets::new(scene, placement, &reaching);
-        let next = budgets.next().map(<[u32]>::to_vec);
-        // Those that have faded out are not needed any more.
-        let has_retiring = placement.owning() < placement.vsls.len();
-        let next = next.or(has_retiring.then_some(budgets.present));
-        self.ledger.hold_refinement(next.is_some());
-        // The last frame did not say that all is done.
-        self.changed = true;
-        next.map(|shares| LightsWanted { placement: Arc::clone(placement), shares })
     }
 
     /// Tasks of all kinds that are under way.
@@ -175,6 +153,7 @@ impl Progress {
         self.ledger = old.resplit(&self.simulation, &next);
         self.tracer = Arc::new(next.tracer.clone());
         self.simulation = next;
+        self.hold_or_refine();
         self.changed = true;
     }
 

@@ -86,8 +86,7 @@ impl LedgerActor {
     }
 
     pub(super) fn state(&self, progress: &Progress) -> State {
-        let converged =
-            self.is_done(progress) || (progress.ledger.is_converged() && progress.has_whole_maps());
+        let converged = self.is_done(progress) || progress.has_converged();
         let statistics = self.statistics(progress, converged);
         State {
             scene: progress.simulation.scene.name.clone(),

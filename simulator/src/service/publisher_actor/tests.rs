@@ -18,6 +18,7 @@ fn scene(size: f64) -> Scene {
 
 fn snapshot(scene: &Scene, vsls: usize) -> Snapshot {
     Snapshot {
+        room: 0,
         vsls: PlacedRecords { records: vec![VslRecord::default(); vsls], version: 0, placement: 0 },
         patches: Arc::default(),
         maps: None,
