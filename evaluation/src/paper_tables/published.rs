@@ -88,7 +88,7 @@ pub const SCENES: [PaperScene; 4] = [
 ];
 
 impl PaperScene {
-    /// The scene, lit by one spot.
+    /// The scene, lit by one spot, with virtual surface lights by area, as the paper has them.
     ///
     /// # Errors
     /// If its model is not there, which says where to get it.
@@ -110,6 +110,7 @@ impl PaperScene {
             };
             config.light = [("spot".to_owned(), light)].into();
         }
+        config.streaming.adaptive = Some(false);
         Ok(config.build()?)
     }
 }
