@@ -109,7 +109,6 @@ pub fn run(
 ) -> Result<DynamicReport, SimulatorError> {
     let mut scene = scene.clone();
     scene.animation = Arc::default();
-    // Measured are changes of light, not lights that move.
     scene.streaming.adaptive = false;
     let simulation = Simulation::new(Arc::new(scene));
     let rays = simulation.fill().counters().rays;

@@ -12,7 +12,7 @@ pub(crate) struct Densities(HashMap<(String, Side), f64>);
 impl Densities {
     /// Those of a placement.
     pub(crate) fn of(scene: &Scene, placement: &Placement) -> Self {
-        let areas: Vec<f64> = placement.surfaces.iter().map(|(on, _)| area(scene, *on)).collect();
+        let areas: Vec<f64> = placement.surfaces.iter().map(|(on, _)| area(scene, on.object)).collect();
         let mean = placement.owning() as f64 / areas.iter().sum::<f64>();
         let densities = placement.surfaces.iter().zip(areas).map(|((on, lights), area)| {
             let name = scene.objects[on.object.0 as usize].name.clone();

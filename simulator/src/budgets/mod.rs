@@ -12,8 +12,8 @@ mod density;
 
 pub(crate) use density::Densities;
 
-use crate::{apportion::apportion, placement::Placement, vsl::Surface};
-use photonstream_scene::Scene;
+use crate::{apportion::apportion, placement::Placement};
+use photonstream_scene::{ObjectId, Scene};
 use photonstream_shading::surface;
 
 /// Lights lie at most so many times as dense as their mean, and at least that part of it: where it is dark now, light may
@@ -23,9 +23,9 @@ pub const MOST_TIMES: f64 = 8.0;
 /// Lights move where that takes this share off the error.
 const LEAST_GAIN: f64 = 0.05;
 
-/// The area of a surface in m²; objects do not change it by moving.
-pub(crate) fn area(scene: &Scene, on: Surface) -> f64 {
-    let triangles = scene.objects[on.object.0 as usize].triangles.clone();
+/// The area of each side of an object in m²; objects do not change it by moving.
+pub(crate) fn area(scene: &Scene, object: ObjectId) -> f64 {
+    let triangles = scene.objects[object.0 as usize].triangles.clone();
     triangles.map(|t| surface::area(scene.geometry.rest_triangle(t))).sum()
 }
 
@@ -43,7 +43,7 @@ pub struct Budgets {
 impl Budgets {
     /// Of a placement from whose surfaces `reaching` watts reach others, in their order. Without any light, all is well.
     pub fn new(scene: &Scene, placement: &Placement, reaching: &[f64]) -> Self {
-        let areas: Vec<f64> = placement.surfaces.iter().map(|(on, _)| area(scene, *on)).collect();
+        let areas: Vec<f64> = placement.surfaces.iter().map(|(on, _)| area(scene, on.object)).collect();
         let present: Vec<u32> = placement.shares().collect();
         let lights: u32 = present.iter().sum();
         let wanted = match densities(&areas, reaching) {

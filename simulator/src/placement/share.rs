@@ -1,8 +1,11 @@
 //! Turns a number of virtual surface lights into the share of each surface.
 
-use crate::{apportion::apportion, budgets::Densities, vsl::Surface};
+use crate::{
+    apportion::apportion,
+    budgets::{self, Densities},
+    vsl::Surface,
+};
 use photonstream_scene::{ObjectId, Scene};
-use photonstream_shading::surface;
 
 /// How many lights a surface gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,15 +19,15 @@ pub(super) struct Share {
 pub(super) fn by_area(scene: &Scene, vsls: u32, densities: &Densities) -> Vec<Share> {
     let mut surfaces = Vec::new();
     for (index, object) in scene.objects.iter().enumerate() {
-        let area: f64 =
-            object.triangles.clone().map(|t| surface::area(scene.geometry.rest_triangle(t))).sum();
-        if !object.triangles.is_empty() {
-            let id = ObjectId(index as u32);
-            surfaces.extend(object.sides.iter().map(|side| {
-                let weight = area * densities.get(&object.name, side);
-                (Surface { object: id, side }, weight)
-            }));
+        if object.triangles.is_empty() {
+            continue;
         }
+        let object_id = ObjectId(index as u32);
+        let area = budgets::area(scene, object_id);
+        surfaces.extend(object.sides.iter().map(|side| {
+            let weight = area * densities.get(&object.name, side);
+            (Surface { object: object_id, side }, weight)
+        }));
     }
     let weights: Vec<f64> = surfaces.iter().map(|&(_, weight)| weight).collect();
     let counts = apportion(&weights, vsls);
