@@ -16,6 +16,15 @@ pub enum Light {
     },
     /// A cone of light with a smooth edge.
     Spot(Spot),
+    /// A small piece of a diffusely emitting surface: several make a lamp.
+    Emitter {
+        /// World position in m.
+        position: Vec3,
+        /// The surface's normal, of unit length.
+        normal: Vec3,
+        /// Intensity along the normal in W sr⁻¹, linear RGB: the power over π.
+        intensity: Vec3,
+    },
     /// Parallel light from infinitely far away.
     Directional {
         /// The way the light travels, of unit length.
@@ -91,12 +100,23 @@ impl Light {
         Self::Point { position, intensity: power * (0.25 * FRAC_1_PI) }
     }
 
+    /// A piece of a diffusely emitting surface of the given power in W, linear RGB; `normal` may have any length, without
+    /// one (zero) it is dark.
+    pub fn emitter(position: Vec3, normal: Vec3, power: Vec3) -> Self {
+        let power = if normal.try_normalize().is_some() { power } else { Vec3::ZERO };
+        let normal = normal.normalize_or(Vec3::NEG_Y);
+        Self::Emitter { position, normal, intensity: saturated(power * FRAC_1_PI) }
+    }
+
     /// What arrives at `x`; `None` where no light goes.
     #[inline]
     pub(crate) fn arrival(&self, x: Vec3) -> Option<Arrival> {
         match self {
             Self::Point { position, intensity } => from_position(*position - x, *intensity, |_| 1.0),
             Self::Spot(spot) => from_position(spot.position - x, spot.intensity, |wi| spot.profile(wi)),
+            Self::Emitter { position, normal, intensity } => {
+                from_position(*position - x, *intensity, |wi| (-normal.dot(wi)).max(0.0))
+            }
             Self::Directional { direction, irradiance } => {
                 Some(Arrival { wi: -*direction, distance: f32::INFINITY, irradiance: saturated(*irradiance) })
             }
@@ -107,7 +127,9 @@ impl Light {
     pub(crate) fn direction_towards(&self, x: Vec3) -> Option<Vec3> {
         match self {
             Self::Point { position, .. } => (x - *position).try_normalize(),
-            Self::Spot(Spot { direction, .. }) | Self::Directional { direction, .. } => Some(*direction),
+            Self::Spot(Spot { direction, .. })
+            | Self::Emitter { normal: direction, .. }
+            | Self::Directional { direction, .. } => Some(*direction),
         }
     }
 }
@@ -162,6 +184,19 @@ mod tests {
         assert!((irradiance(&light, sixty).x - 0.5).abs() < 1e-6);
         assert!(light.arrival(Vec3::new(1.0, 1e-3, 0.0)).is_none());
         assert!(light.arrival(Vec3::Y).is_none());
+    }
+
+    /// By hand: 2π W are 2 W/sr along the normal; at 60° and distance 2, 2 · ½ / 4 W/m². None behind. Tolerance: four
+    /// roundings.
+    #[test]
+    fn emitter_falls_with_its_cosine() {
+        let light = Light::emitter(Vec3::ZERO, Vec3::NEG_Y * 3.0, Vec3::splat(2.0 * PI));
+        let sixty = Vec3::new(0.75f32.sqrt(), -0.5, 0.0) * 2.0;
+        assert!(irradiance(&light, sixty).abs_diff_eq(Vec3::splat(0.25), 3e-7));
+        assert!(light.arrival(Vec3::Y).is_none() && light.arrival(Vec3::X).is_none());
+        assert_eq!(light.direction_towards(Vec3::X), Some(Vec3::NEG_Y));
+        let dark = Light::emitter(Vec3::ZERO, Vec3::ZERO, Vec3::ONE);
+        assert_eq!(irradiance(&dark, Vec3::NEG_Y), Vec3::ZERO);
     }
 
     #[test]

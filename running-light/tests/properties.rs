@@ -29,6 +29,8 @@ fn any_light() -> impl Strategy<Value = Light> {
     prop_oneof![
         (any_vector(), any_vector()).prop_map(|(position, power)| Light::point(position, power)),
         spot.prop_map(Light::Spot),
+        (any_vector(), any_vector(), any_vector())
+            .prop_map(|(position, normal, power)| Light::emitter(position, normal, power)),
         (any_vector(), any_vector())
             .prop_map(|(direction, irradiance)| Light::Directional { direction, irradiance }),
     ]
@@ -67,6 +69,11 @@ fn light() -> impl Strategy<Value = Light> {
         (place(), colour()).prop_map(|(position, colour)| Light::point(position, colour * 50.0)),
         (place(), direction(), half_angles, colour())
             .prop_map(|(x, axis, angles, colour)| Light::Spot(Spot::new(x, axis, angles, colour * 50.0))),
+        (place(), direction(), colour()).prop_map(|(x, normal, colour)| Light::emitter(
+            x,
+            normal,
+            colour * 50.0
+        )),
         (direction(), colour())
             .prop_map(|(direction, irradiance)| Light::Directional { direction, irradiance }),
     ]
@@ -100,6 +107,10 @@ fn irradiance(vpl: &Vpl, light: &Light) -> f64 {
     match light {
         Light::Point { position, intensity } => at((position - vpl.position).as_dvec3(), *intensity),
         Light::Spot(spot) => at((spot.position - vpl.position).as_dvec3(), spot.intensity),
+        Light::Emitter { position, normal, intensity } => {
+            let d = (position - vpl.position).as_dvec3();
+            at(d, *intensity) * (-normal.as_dvec3().dot(d.normalize())).max(0.0)
+        }
         Light::Directional { direction, irradiance } => {
             f64::from(irradiance.max_element()) * cos_theta(-direction.as_dvec3())
         }

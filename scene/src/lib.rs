@@ -22,6 +22,7 @@ mod primitives;
 mod scene;
 mod settings;
 mod texturing;
+pub mod vpls;
 
 pub use animation::Animation;
 pub use config::SceneConfig;
@@ -32,5 +33,9 @@ pub use import::AssetRoots;
 pub use model::{ModelOptions, ModelScene, is_model};
 pub use picture::{Picture, Texture};
 pub use scene::{Geometry, LightId, Material, MaterialId, Object, ObjectId, Scene, SceneLight, Side, Sides};
-pub use settings::{RangeCulling, RenderSettings, Sampling, StreamingSettings, Visibility};
+pub use settings::{
+    Method, PhantomSurfaces, RangeCulling, RenderSettings, Sampling, StreamingSettings, Visibility,
+    VplSettings, VplVisibility, Weights,
+};
 pub use texturing::Detail;
+pub use vpls::VplSet;

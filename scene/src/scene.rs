@@ -10,6 +10,7 @@ use crate::{
     placement::Placement,
     pose::{Pose, RestMesh},
     settings::{RenderSettings, StreamingSettings},
+    vpls::VplSet,
 };
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
 use photonstream_shading::{Camera, Light, light::Bounds, surface};
@@ -56,6 +57,8 @@ pub struct Scene {
     pub streaming: StreamingSettings,
     /// Default settings of the renderers.
     pub render: RenderSettings,
+    /// What the methods of few lights know of it.
+    pub vpls: Arc<VplSet>,
     /// All triangles, in world space.
     pub geometry: Arc<Geometry>,
     /// Answers closest-hit and occlusion queries over `geometry`.

@@ -16,6 +16,97 @@ pub enum Sampling {
     Fresh,
 }
 
+/// How light is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Method {
+    /// Photons are traced and kept: paper A.
+    #[default]
+    PhotonStreaming,
+    /// Predefined virtual point lights, whose flux alone changes: paper B §4.1.
+    StaticVpl,
+    /// One virtual point light where the axis of each spot meets the scene, in their place: paper B §4.3.
+    PhantomVpl,
+    /// One virtual point light for each of a few photons from fixed directions: Keller 1997, paper B §5.3.4.
+    InstantRadiosity,
+    /// The most exact of them that the time for an update allows.
+    Auto,
+}
+
+/// How the weights of virtual point lights that have none of their own are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Weights {
+    /// All at once, whenever something has moved.
+    #[default]
+    Whole,
+    /// One comparison for each update.
+    Amortised,
+}
+
+/// What stands between lights and virtual point lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum VplVisibility {
+    /// The scene's blockers.
+    #[default]
+    Blockers,
+    /// The scene: a ray from each to each.
+    Rays,
+    /// Nothing.
+    None,
+}
+
+/// What the axis of a spot is intersected with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum PhantomSurfaces {
+    /// The scene.
+    #[default]
+    Scene,
+    /// The scene's proxies.
+    Proxies,
+}
+
+/// Settings of the methods of few lights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VplSettings {
+    /// The area in m² of a VPL of weight 1; larger makes all indirect light brighter.
+    pub area_per_weight: f32,
+    /// VPLs whose brightest channel has less intensity, in W sr⁻¹, are switched off.
+    pub cull_intensity: f32,
+    /// How weights that are not given are computed.
+    pub weights: Weights,
+    /// What stands between lights and VPLs.
+    pub visibility: VplVisibility,
+    /// What the axis of a spot is intersected with.
+    pub phantom_surfaces: PhantomSurfaces,
+    /// VPLs closer than its root count as if they were there, m².
+    pub softening: f32,
+    /// Time in s after which a phantom has followed 63 % of a jump.
+    pub smoothing_s: f32,
+    /// Mean reflectance of what the second bounce comes from, 0 to 1.
+    pub second_bounce_albedo: f32,
+    /// How far from the first the second bounce comes from, m; 0: there is none.
+    pub second_bounce_distance: f32,
+    /// Photons of instant radiosity.
+    pub photons: u32,
+}
+
+impl Default for VplSettings {
+    /// Paper B's values; where it has none, those of its script.
+    fn default() -> Self {
+        Self {
+            area_per_weight: 1.0,
+            cull_intensity: 0.01,
+            weights: Weights::Whole,
+            visibility: VplVisibility::Blockers,
+            phantom_surfaces: PhantomSurfaces::Scene,
+            softening: 0.005,
+            smoothing_s: 0.024,
+            second_bounce_albedo: 0.4,
+            second_bounce_distance: 0.0,
+            photons: 64,
+        }
+    }
+}
+
 /// Whether virtual surface lights are shadowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Visibility {
@@ -45,6 +136,10 @@ pub enum RangeCulling {
 /// Settings of the simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamingSettings {
+    /// How light is simulated.
+    pub method: Method,
+    /// For [`Method::Auto`]: time that an update of the light may take, µs; `None`: any.
+    pub update_budget_us: Option<f64>,
     /// Number of virtual surface lights in the scene.
     pub vsls: u32,
     /// Number of paths in the pool, over all lights; at most [`StreamingSettings::MAX_POOL_PATHS`].
@@ -97,6 +192,8 @@ impl StreamingSettings {
 impl Default for StreamingSettings {
     fn default() -> Self {
         Self {
+            method: Method::PhotonStreaming,
+            update_budget_us: None,
             vsls: 1000,
             pool_paths: 1 << 17,
             sampling: Sampling::Replay,
@@ -193,6 +290,18 @@ named!(
 );
 named!(Interpolation, "interpolation", Linear = "linear", Smooth = "smooth", Step = "step");
 named!(Repeat, "repeat", Loop = "loop", Bounce = "bounce", Once = "once");
+named!(
+    Method,
+    "method",
+    PhotonStreaming = "photon-streaming",
+    StaticVpl = "static-vpl",
+    PhantomVpl = "phantom-vpl",
+    InstantRadiosity = "instant-radiosity",
+    Auto = "auto"
+);
+named!(Weights, "weights", Whole = "whole", Amortised = "amortised");
+named!(VplVisibility, "visibility", Blockers = "blockers", Rays = "rays", None = "none");
+named!(PhantomSurfaces, "phantom_surfaces", Scene = "scene", Proxies = "proxies");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
 named!(RangeCulling, "culling", Cut = "cut", Stochastic = "stochastic");
 named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays", Octahedral = "octahedral");

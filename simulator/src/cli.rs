@@ -7,7 +7,7 @@ use crate::{
     simulation::Simulation,
 };
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{Sampling, Scene, SceneConfig, SceneError, StreamingSettings};
+use photonstream_scene::{Method, Sampling, Scene, SceneConfig, SceneError, StreamingSettings};
 use photonstream_shading::distance_map::EDGES;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::{
@@ -44,9 +44,9 @@ pub struct Args {
 /// Settings that override the config's `[streaming]` table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Overrides {
-    /// Lighting method
-    #[arg(long, value_parser = ["photon-streaming"])]
-    pub method: Option<String>,
+    /// How light is simulated: `photon-streaming`, `static-vpl`, `phantom-vpl`, `instant-radiosity`, or `auto`
+    #[arg(long)]
+    pub method: Option<Method>,
     /// Number of virtual surface lights
     #[arg(long)]
     pub vsls: Option<u32>,
@@ -115,6 +115,7 @@ impl Overrides {
             None => config,
         };
         let streaming = &mut config.streaming;
+        streaming.method = self.method.or(streaming.method);
         streaming.vsls = self.vsls.or(streaming.vsls);
         streaming.pool_paths = self.pool.or(streaming.pool_paths);
         streaming.seed = self.seed.or(streaming.seed);
@@ -140,7 +141,7 @@ impl Overrides {
         let mut add = |name: &str, value: Option<String>| {
             arguments.extend(value.map(|value| format!("--{name}={value}")));
         };
-        add("method", self.method.clone());
+        add("method", self.method.map(|m| m.name().to_owned()));
         add("time", self.time.map(|t| t.to_string()));
         add("vsls", self.vsls.map(|v| v.to_string()));
         add("pool", self.pool.map(|v| v.to_string()));
@@ -187,7 +188,8 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         scene = %simulation.scene.name,
         triangles = simulation.scene.geometry.triangles.len(),
         lights = simulation.scene.lights.len(),
-        vsls = simulation.placement.vsls.len(),
+        method = simulation.method.name(),
+        vsls = simulation.published_lights(),
         pool_paths = simulation.emitters.slots,
         load_ms = loaded.as_millis() as u64,
         place_ms = (begun.elapsed() - loaded).as_millis() as u64,

@@ -35,8 +35,8 @@ pub struct Column {
     pub shared_watts: Option<f32>,
 }
 
-/// The split of the pool among the lights.
-#[derive(Clone, Debug, PartialEq)]
+/// The split of the pool among the lights; by default none for any of them.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Emitters {
     /// One entry a light, in their order.
     pub lights: Vec<LightSlots>,
@@ -62,11 +62,11 @@ impl Emitters {
         self.lights.iter().map(|l| l.slots.end - l.slots.start).collect()
     }
 
-    /// The emitters of a scene of which each light has the given number of slots.
+    /// The emitters of a scene of which each light has the given number of slots; for no numbers at all, none.
     pub fn with_slots(scene: &Scene, slots: &[u32]) -> Self {
         let count = scene.lights.len();
-        if count == 0 {
-            return Self { lights: vec![], columns: vec![], slots: 0 };
+        if count == 0 || slots.is_empty() {
+            return Self::default();
         }
         let watts = watts(scene);
         let own = (scene.streaming.light_columns.max(1) as usize).min(count);

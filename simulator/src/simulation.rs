@@ -7,7 +7,9 @@ use crate::{
     change::Moved,
     emitters::{Emitters, LightSlots},
     exposure,
+    few_lights::{self, FewLights},
     ledger::{Ledger, PATHS_PER_TASK},
+    method::choose,
     owner::{
         OwnerTable,
         kept::{self, OwnerCache},
@@ -15,7 +17,7 @@ use crate::{
     placement::Placement,
     tracer::{PathBatch, Tracer, Wave},
 };
-use photonstream_scene::Scene;
+use photonstream_scene::{Method, Scene};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -34,6 +36,9 @@ pub struct Simulation {
     pub tracer: Tracer,
     /// The share of each light's patch that is not inside of something: [`exposure::shares`].
     pub exposed: Arc<[f32]>,
+    /// How its light is simulated; never `auto`. For a method of few lights there are no virtual surface lights, and no
+    /// pool: [`crate::few_lights::FewLights`] has the light.
+    pub method: Method,
 }
 
 impl Simulation {
@@ -54,7 +59,13 @@ impl Simulation {
         cache: Option<&OwnerCache>,
         cancel: &Cancel,
     ) -> Option<Self> {
-        let are_adaptive = |base: &&Self| base.scene.streaming.adaptive && scene.streaming.adaptive;
+        let method = choose(&scene).method;
+        if method != Method::PhotonStreaming {
+            let (placement, emitters) = (Placement::default(), Arc::new(Emitters::default()));
+            return Self::of_placement(scene, placement, emitters, None, cancel);
+        }
+        let are_adaptive =
+            |base: &&Self| base.is_streaming() && base.scene.streaming.adaptive && scene.streaming.adaptive;
         let placement = match base.filter(are_adaptive) {
             // What has the same name is probably lit alike.
             Some(base) => base.placement.followed_unless(&base.scene, &scene, cancel)?,
@@ -78,7 +89,26 @@ impl Simulation {
         let owners = Arc::new(owners);
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
         let exposed = exposure::shares(&scene, &placement).into();
-        cancel.or(Self { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed })
+        let (placement, method) = (Arc::new(placement), choose(&scene).method);
+        cancel.or(Self { scene, placement, owners, emitters, tracer, exposed, method })
+    }
+
+    /// Whether photons are traced: else its light is that of a method of few lights.
+    pub fn is_streaming(&self) -> bool {
+        self.method == Method::PhotonStreaming
+    }
+
+    /// The lights of a method of few lights, before their first update; `None` where photons are streamed.
+    pub fn few_lights(&self) -> Option<FewLights> {
+        (!self.is_streaming()).then(|| FewLights::new(&self.scene, self.method))
+    }
+
+    /// The number of virtual lights that are published: of placed ones, or of a method of few.
+    pub fn published_lights(&self) -> usize {
+        if self.is_streaming() {
+            return self.placement.vsls.len();
+        }
+        few_lights::count(&self.scene, self.method)
     }
 
     /// The same scene with other numbers of virtual surface lights on its surfaces, in their order; the pool is split as
@@ -93,7 +123,7 @@ impl Simulation {
 
     /// Where the scene is adaptive, with virtual surface lights where the light of its filled pool is; else the same.
     pub fn adapted(self) -> Self {
-        if !self.scene.streaming.adaptive {
+        if !self.scene.streaming.adaptive || !self.is_streaming() {
             return self;
         }
         let reaching = self.fill().reaching_watts(&self.scene, &self.placement);
@@ -126,6 +156,7 @@ impl Simulation {
             emitters,
             tracer,
             exposed,
+            method: self.method,
         }
     }
 

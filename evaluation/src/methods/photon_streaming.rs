@@ -5,7 +5,7 @@ use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{RenderOptions, VslSet, Watch};
 use photonstream_renderer_cpu::render;
-use photonstream_scene::{Sampling, Scene, StreamingSettings, Visibility};
+use photonstream_scene::{Method, Sampling, Scene, StreamingSettings, Visibility};
 use photonstream_simulator::{
     distance_maps,
     emitters::Emitters,
@@ -27,6 +27,7 @@ const PAPER_SCALE: f32 = 0.9;
 pub(super) fn place(scene: &Scene, (vsls, seed, is_as_paper): (u32, u64, bool)) -> (Simulation, f64) {
     let mut scene = scene.clone();
     (scene.streaming.vsls, scene.streaming.seed) = (vsls, seed);
+    scene.streaming.method = Method::PhotonStreaming;
     let scene = Arc::new(scene);
     let begun = Instant::now();
     let simulation = if is_as_paper {
@@ -36,7 +37,8 @@ pub(super) fn place(scene: &Scene, (vsls, seed, is_as_paper): (u32, u64, bool)) 
         let emitters = Arc::new(Emitters::new(&scene));
         let tracer = Tracer::new(Arc::clone(&scene), Arc::clone(&owners), Arc::clone(&emitters));
         let exposed = exposure::shares(&scene, &placement).into();
-        Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed }
+        let method = Method::PhotonStreaming;
+        Simulation { scene, placement: Arc::new(placement), owners, emitters, tracer, exposed, method }
     } else {
         Simulation::new(scene).adapted()
     };

@@ -19,8 +19,13 @@ impl SceneConfig {
         check_time(time_s)?;
         let mut frozen = self.clone();
         let has_files = frozen.object.values().any(|object| object.gltf.is_some());
+        // They are built once, too.
+        let has_files = has_files || frozen.has_attached();
         if (has_files || !frozen.animation.is_empty()) && frozen.origin_m.is_none() {
             frozen.origin_m = Some(self.clone().build()?.origin_m.into());
+        }
+        if time_s != 0.0 {
+            frozen.carry_attached(time_s)?;
         }
         let document = std::mem::take(&mut frozen.document);
         let animation = read(&mut frozen, &Field::root(&document))?;

@@ -13,6 +13,7 @@ mod objects;
 mod settings;
 pub(crate) mod sky;
 mod steady_state;
+mod vpls;
 
 use crate::{
     animation::{self, Rig},
@@ -128,6 +129,8 @@ impl SceneConfig {
         animation.carry(inputs.rigs, &objects);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
         notices.extend(steady_state::notice(&features, &objects, &materials));
+        let anchors = vpls::Anchors { objects: &objects, rest_meshes: &rest_meshes, origin: origin_m };
+        let vpls = vpls::read(&mut self, &root, streaming.method, &anchors)?;
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents, inputs.sky_content.as_ref());
         let mut scene = Scene {
             name,
@@ -141,6 +144,7 @@ impl SceneConfig {
             camera,
             streaming,
             render,
+            vpls: Arc::new(vpls),
             geometry: Arc::new(geometry),
             bvh,
             bounds,

@@ -31,6 +31,12 @@ pub(super) fn streaming(
         let remedy = "choose one of them, or leave the key out";
         return Err(field.key("distance_map_px").invalid(distance_map_px, "0, 8, 16, 32 or 64", remedy));
     }
+    let method = *config.method.get_or_insert(d.method);
+    if let Some(budget) = config.update_budget_us {
+        field
+            .key("update_budget_us")
+            .number(budget, "a time above 0, up to 1e9 µs", |x| x > 0.0 && x <= 1e9)?;
+    }
     let adaptive = *config.adaptive.get_or_insert(d.adaptive);
     // Lights that move have a map where they were and one where they are.
     let maps = u64::from(vsls) * if adaptive { 2 } else { 1 };
@@ -58,6 +64,8 @@ pub(super) fn streaming(
         field.key("threads").count(threads, 1..=1024)?;
     }
     Ok(StreamingSettings {
+        method,
+        update_budget_us: config.update_budget_us,
         vsls: field.key("vsls").count(vsls, 1..=StreamingSettings::MAX_VSLS)?,
         pool_paths: field.key("pool_paths").count(pool_paths, 1..=StreamingSettings::MAX_POOL_PATHS)?,
         sampling: *config.sampling.get_or_insert(d.sampling),
@@ -112,6 +120,6 @@ pub(super) fn render(config: &mut RenderConfig, field: &Field<'_>) -> Result<Ren
 }
 
 /// The shortest decimal of `x` as f64: 0.9 for 0.9_f32, so that resolved configs read as documented.
-fn widen(x: f32) -> f64 {
+pub(super) fn widen(x: f32) -> f64 {
     x.to_string().parse().expect("invariant: a displayed number parses")
 }

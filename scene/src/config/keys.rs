@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::settings::{PhantomSurfaces, VplVisibility, Weights};
 use std::{collections::BTreeSet, path::Path};
 use toml::{Table, Value};
 
@@ -123,6 +124,8 @@ fn every_key() -> SceneConfig {
         light: [("NAME".into(), light)].into(),
         animation: vec![animation.clone(), animation],
         streaming: StreamingConfig {
+            method: Some(Method::StaticVpl),
+            update_budget_us: Some(1.0),
             vsls: Some(1),
             pool_paths: Some(1),
             sampling: Some(Sampling::Fresh),
@@ -148,6 +151,34 @@ fn every_key() -> SceneConfig {
             exposure_ev: Some(1.0),
             tone_map: Some(ToneMap::Linear),
         },
+        vpls: Some(VplsConfig {
+            area_per_weight_m2: Some(1.0),
+            cull_intensity_w_sr: Some(1.0),
+            weights: Some(Weights::Amortised),
+            visibility: Some(VplVisibility::Rays),
+            phantom_surfaces: Some(PhantomSurfaces::Proxies),
+            softening_m2: Some(1.0),
+            smoothing_s: Some(1.0),
+            second_bounce_albedo: Some(1.0),
+            second_bounce_distance_m: Some(1.0),
+            photons: Some(1),
+        }),
+        vpl: vec![VplConfig {
+            position_m: v,
+            normal: v,
+            albedo: OneOrThree([0.5; 3]),
+            weight: Some(1.0),
+            object: Some("o".into()),
+        }],
+        blocker: vec![BlockerConfig { position_m: v, radius_m: 1.0, object: Some("o".into()) }],
+        proxy: vec![ProxyConfig {
+            position_m: Some(v),
+            rotation_deg: Some(v),
+            cuboid: Some(BoxConfig { size_m: v, centre_m: Some(v) }),
+            sphere: Some(ProxySphereConfig { radius_m: 1.0 }),
+            hull: Some(HullConfig { points_m: vec![v] }),
+            object: Some("o".into()),
+        }],
         document: Document::default(),
         chosen: Vec::new(),
     }
@@ -223,6 +254,7 @@ fn documented_defaults_are_those_of_a_resolved_scene() {
             { light = "f", property = "position_m", orbit = { centre_m = [0, 1, 0], axis = [0, 1, 0], radius_m = 1, period_s = 1 } },
             { object = "b", property = "position_m", times_s = [0], values = [[0, 0, 0]] },
         ]
+        proxy = [{ box = { size_m = [1, 1, 1] } }]
         object.e = { material = "m", box = { size_m = [1, 1, 1] } }
         light.f = { power_w = 1, point = { position_m = [0, 1, 0] } }
         light.s = { sky = { map = "a.hdr" } }

@@ -9,6 +9,7 @@ mod imports;
 mod keys;
 mod sky;
 mod values;
+mod vpls;
 
 pub use animation::{AnimatedProperty, AnimatedValue, AnimationConfig, Interpolation, OrbitConfig, Repeat};
 pub(crate) use document::{Document, Field};
@@ -16,10 +17,11 @@ pub use domain::{MAX_LENGTH_M, MAX_POWER};
 pub use imports::{AnimationChoice, GltfConfig, LightOverride, ObjConfig, PartOverride, PlyConfig, UpAxis};
 pub use sky::SkyConfig;
 pub use values::{OneOrThree, Vector};
+pub use vpls::{BlockerConfig, HullConfig, ProxyConfig, ProxySphereConfig, VplConfig, VplsConfig};
 
 use crate::{
     scene::Sides,
-    settings::{RangeCulling, Sampling, Visibility},
+    settings::{Method, RangeCulling, Sampling, Visibility},
 };
 use photonstream_shading::{Kernel, tone::ToneMap};
 use serde::{Deserialize, Serialize};
@@ -53,6 +55,18 @@ pub struct SceneConfig {
     /// Default settings of the renderers.
     #[serde(default)]
     pub render: RenderConfig,
+    /// Settings of the methods of few lights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vpls: Option<VplsConfig>,
+    /// Places that may reflect light, for the methods of few lights.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vpl: Vec<VplConfig>,
+    /// Spheres that keep light from them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocker: Vec<BlockerConfig>,
+    /// Bodies in the place of the scene, for the axes of spots.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub proxy: Vec<ProxyConfig>,
     #[serde(skip)]
     pub(crate) document: Document,
     /// What was chosen for a model that has no scene file, one sentence each.
@@ -243,6 +257,11 @@ pub struct RectangleConfig {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StreamingConfig {
+    /// How light is simulated.
+    #[serde(default, with = "values::by_name")]
+    pub method: Option<Method>,
+    /// For method `auto`: time that an update of the light may take.
+    pub update_budget_us: Option<f64>,
     /// Number of virtual surface lights in the scene.
     pub vsls: Option<u32>,
     /// Number of paths in the pool.

@@ -127,9 +127,13 @@ impl_named!(
     super::Repeat,
     super::UpAxis,
     crate::scene::Sides,
+    crate::settings::Method,
+    crate::settings::PhantomSurfaces,
     crate::settings::RangeCulling,
     crate::settings::Sampling,
     crate::settings::Visibility,
+    crate::settings::VplVisibility,
+    crate::settings::Weights,
     photonstream_shading::Kernel,
     photonstream_shading::tone::ToneMap
 );

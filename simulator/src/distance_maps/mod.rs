@@ -67,7 +67,7 @@ pub(crate) fn words(edge: u32) -> usize {
 
 /// Where a light looks from.
 #[derive(Clone, Copy, Debug)]
-struct View {
+pub(crate) struct View {
     origin: Vec3,
     axes: Axes,
 }
@@ -81,6 +81,12 @@ impl View {
         Self { origin, axes: Axes::of(normal) }
     }
 
+    /// That of a light of the given place and unit normal, m, which lies on or near a surface.
+    pub(crate) fn from(scene: &Scene, position: Vec3, normal: Vec3) -> Self {
+        let magnitude = position.abs().max_element() + scene.bounds.radius;
+        Self { origin: position + normal * (magnitude * surface::RELATIVE_OFFSET), axes: Axes::of(normal) }
+    }
+
     /// Along the middle of a texel, of 1-norm 1 in the light's axes: so far away as t is what the map holds.
     fn direction(&self, edge: u32, x: u32, y: u32) -> Vec3 {
         self.axes.world(distance_map::centre(edge, x, y))
@@ -91,7 +97,7 @@ impl View {
         scene.bvh.closest(&ray).map_or(0, |hit| distance_map::pack(1.0 / hit.t).into())
     }
 
-    fn trace(&self, scene: &Scene, edge: u32, map: &mut [u32]) {
+    pub(crate) fn trace(&self, scene: &Scene, edge: u32, map: &mut [u32]) {
         let mut texels = (0..edge * edge).map(|i| self.look(scene, self.direction(edge, i % edge, i / edge)));
         for word in map {
             // There are two for each word.

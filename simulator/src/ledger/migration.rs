@@ -52,7 +52,7 @@ impl Migration {
             .zip(&new.emitters.lights)
             .map(|(light, slots)| {
                 let index = before.light(&light.name)?.0 as usize;
-                let (old_light, old_slots) = (&before.lights[index], &old.emitters.lights[index]);
+                let (old_light, old_slots) = (&before.lights[index], old.emitters.lights.get(index)?);
                 let count = |slots: &std::ops::Range<u32>| slots.end - slots.start;
                 let is_moved = old_light.light.shape != light.light.shape
                     || (light.light.shape.is_distant() && before.bounds != after.bounds)

@@ -33,7 +33,7 @@ use std::ops::Range;
 pub const OVERSAMPLING: f64 = 2.0;
 
 /// The virtual surface lights of a scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placement {
     /// All lights, ordered by surface; then those that are retiring, which own nothing.
     pub vsls: Vec<Vsl>,

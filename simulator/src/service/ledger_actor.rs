@@ -1,6 +1,7 @@
 //! Runs the ledger: hands out tasks, takes in batches, and decides when a frame is due.
 
 mod fade;
+mod few;
 mod messages;
 mod moves;
 mod progress;
@@ -25,6 +26,7 @@ use crate::{
 };
 use crossbeam::queue::ArrayQueue;
 use fade::Fade;
+use few::Few;
 pub(super) use messages::{Asked, Change, FromLedger, LightsWanted, ToLedger, Version};
 use moves::Moves;
 use photonstream_protocol::monotonic_ns;
@@ -102,6 +104,8 @@ struct Progress {
     moves: Moves,
     /// They come from where they were.
     fade: Option<Fade>,
+    /// What is shown instead, by a method of few lights.
+    few: Option<Few>,
     /// The last frame was of a simulation that goes on, and of the whole light.
     shown_running: bool,
     shown_whole: bool,
@@ -149,6 +153,7 @@ impl LedgerActor {
             split_is_due: true,
             moves: Moves::new(started),
             fade: None,
+            few: self.simulation.few_lights().map(Few::new),
             shown_running: true,
             shown_whole: false,
             next_frame: started + period(&self.simulation),
@@ -326,18 +331,23 @@ impl LedgerActor {
         let Some(mut vsls) = self.emptied.pop() else { return Published::Later };
         let begun = Instant::now();
         let scene = &progress.simulation.scene;
-        if vsls.placement != progress.placements {
+        let (now_ms, time_s, is_in_steps) = (progress.now_ms(), progress.time_s, progress.is_in_steps());
+        if let Some(few) = &mut progress.few {
+            few.go_on(scene, begun, time_s, is_in_steps);
+            vsls.records = few.lights.records(progress.placements as u32);
+            (vsls.placement, vsls.version) = (progress.placements, progress.places);
+        } else if vsls.placement != progress.placements {
             vsls.records = records::vsl_records(scene, &progress.simulation.placement);
             let generation = progress.placements as u32;
             vsls.records.iter_mut().for_each(|record| record.generation = generation);
             (vsls.placement, vsls.version) = (progress.placements, progress.places);
         }
-        if vsls.version != progress.places {
+        if progress.few.is_none() && vsls.version != progress.places {
             vsls.version = progress.places;
             records::write_places(&mut vsls.records, scene, &progress.simulation.placement);
         }
-        let (now_ms, time_s, is_in_steps) = (progress.now_ms(), progress.time_s, progress.is_in_steps());
         match &mut progress.fade {
+            _ if progress.few.is_some() => {}
             None => records::write_flux(&mut vsls.records, progress.ledger.readings(scene), now_ms),
             Some(fade) => {
                 fade.go_on(begun, time_s, is_in_steps);
@@ -348,7 +358,12 @@ impl LedgerActor {
         let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
         let statistics = self.statistics(progress, converged || progress.has_converged());
-        let maps = progress.maps.as_mut().map(|maps| MapUpdate::of(maps, progress.placements));
+        let placements = progress.placements;
+        let of_few = progress.few.as_mut().and_then(|few| few.lights.take_changed_maps());
+        let maps = match of_few {
+            Some(changed) => Some(MapUpdate::of_few(changed, placements)),
+            None => progress.maps.as_mut().map(|maps| MapUpdate::of(maps, placements)),
+        };
         let snapshot = Snapshot {
             room: progress.room(),
             vsls,
@@ -371,7 +386,7 @@ impl LedgerActor {
         // While lights fade every frame is another one, and where they go then has to be decided.
         progress.changed = match progress.end_fade_if_over() {
             true => true,
-            false => progress.fade.is_some() && !progress.paused && !is_in_steps,
+            false => progress.is_on_its_way() && !progress.paused && !is_in_steps,
         };
         progress.shown_whole = progress.is_whole();
         Published::Yes

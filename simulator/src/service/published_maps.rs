@@ -1,6 +1,9 @@
 //! Turns the distance maps that have changed since the last frame into the records of the next one.
 
-use crate::distance_maps::{Map, Schedule};
+use crate::{
+    distance_maps::{Map, Schedule},
+    few_lights::MapsChanged,
+};
 use photonstream_protocol::{ChunkSet, DISTANCE_TEXELS, DistanceRecord};
 
 /// Distance maps that have changed.
@@ -18,6 +21,12 @@ impl MapUpdate {
     pub(super) fn of(maps: &mut Schedule, placement: u64) -> Self {
         let each = (maps.edge() * maps.edge()) as usize / DISTANCE_TEXELS;
         Self { placement, lights: maps.len(), each, changed: maps.take_changed() }
+    }
+
+    /// What has changed of the maps of few lights.
+    pub(super) fn of_few(maps: MapsChanged, placement: u64) -> Self {
+        let MapsChanged { edge, lights, changed } = maps;
+        Self { placement, lights, each: (edge * edge) as usize / DISTANCE_TEXELS, changed }
     }
 
     /// Records of so many lights.

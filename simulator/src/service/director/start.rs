@@ -38,10 +38,11 @@ impl Director {
         let place = PlacedRecords { records: place, version: 0, placement: 0 };
         let still = Arc::new(Still::new(&scene));
         let edge = scene.streaming.distance_map_px as usize;
-        let distances = place.records.len() * edge * edge / DISTANCE_TEXELS;
+        let lights = simulation.published_lights();
+        let distances = lights * edge * edge / DISTANCE_TEXELS;
         // Lights that move are shown where they were and where they are, for a while.
-        let times = if scene.streaming.adaptive { 2 } else { 1 };
-        let spec = still.spec(times * place.records.len(), times * distances, None);
+        let times = if scene.streaming.adaptive && simulation.is_streaming() { 2 } else { 1 };
+        let spec = still.spec(times * lights, times * distances, None);
         let publisher = Publisher::create(&options.channel, &spec)?;
         let server = ControlServer::start(&publisher)?;
 

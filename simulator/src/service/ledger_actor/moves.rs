@@ -43,18 +43,23 @@ impl Moves {
 
 impl Progress {
     fn is_adaptive(&self) -> bool {
-        self.simulation.scene.streaming.adaptive
+        self.simulation.scene.streaming.adaptive && self.simulation.is_streaming()
     }
 
     /// Whether virtual surface lights stay where they are, as far as is known; while paused they do.
     pub(super) fn has_lights_at_rest(&self) -> bool {
         let is_decided = self.moves.due == Due::Never && !self.moves.are_wanted;
-        self.paused || ((is_decided || !self.is_adaptive()) && self.fade.is_none())
+        self.paused || ((is_decided || !self.is_adaptive()) && !self.is_on_its_way())
     }
 
     /// Whether all light is as exact as it will be.
     pub(super) fn has_converged(&self) -> bool {
         self.ledger.is_converged() && self.has_whole_maps() && self.has_lights_at_rest()
+    }
+
+    /// Whether lights go on changing in a scene that does not: they fade, or phantoms follow.
+    pub(super) fn is_on_its_way(&self) -> bool {
+        self.fade.is_some() || self.few.as_ref().is_some_and(|few| few.lights.is_following())
     }
 
     /// Nothing is refined that will have to be refined again, in other lights.
@@ -66,6 +71,9 @@ impl Progress {
     /// Room for so many virtual surface lights, so that those that move can be shown twice.
     pub(super) fn room(&self) -> usize {
         let placement = &self.simulation.placement;
+        if let Some(few) = &self.few {
+            return few.lights.lights().len();
+        }
         if self.is_adaptive() { 2 * placement.owning() } else { placement.vsls.len() }
     }
 

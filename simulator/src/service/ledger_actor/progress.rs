@@ -1,6 +1,6 @@
 //! Turns new versions of the scene into what the ledger goes on with, and the time that changes take into budgets.
 
-use super::{Asked, Fade, Moved, Progress, SceneChange, Version};
+use super::{Asked, Fade, Few, Moved, Progress, SceneChange, Version};
 use crate::{distance_maps::Schedule, ledger::Migration, records, simulation::Simulation};
 use photonstream_protocol::{PatchRecord, monotonic_ns};
 use photonstream_scene::Geometry;
@@ -53,6 +53,7 @@ impl Progress {
             let budget = self.budget(&simulation);
             self.ledger = old.migrate(&migration, &simulation, budget);
             self.replace_maps(&simulation, moved);
+            self.few = simulation.few_lights().map(Few::new);
         }
         self.tracer = Arc::new(simulation.tracer.clone());
         self.simulation = simulation;

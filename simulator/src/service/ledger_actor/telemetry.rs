@@ -17,8 +17,16 @@ pub struct State {
     pub paused: bool,
     /// Whether every slot of the pool holds a path: the light is as good as the pool's size makes it.
     pub converged: bool,
+    /// How its light is simulated.
+    pub method: &'static str,
     /// Number of virtual surface lights.
     pub vsls: usize,
+    /// Of a method of few lights, how many of them shine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shining: Option<usize>,
+    /// Of a method of few lights, the time of the last update, µs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub update_us: Option<f64>,
     /// Slots of the path pool.
     pub pool_paths: u32,
     /// Slots that hold a path.
@@ -93,7 +101,10 @@ impl LedgerActor {
             scene_hash: format!("{:016x}", progress.simulation.scene.hash),
             paused: progress.paused,
             converged: statistics.converged == 1,
-            vsls: progress.simulation.placement.vsls.len(),
+            method: progress.simulation.method.name(),
+            vsls: progress.simulation.published_lights(),
+            shining: progress.few.as_ref().map(|few| few.lights.shining()),
+            update_us: progress.few.as_ref().map(|few| few.lights.update_us()),
             pool_paths: statistics.pool_paths as u32,
             pool_valid: statistics.pool_valid as u32,
             stale_share: statistics.stale_share,

@@ -1,0 +1,134 @@
+//! Turns predefined VPLs and blockers into where they are now, and what the VPLs weigh.
+
+use glam::Vec3;
+use photonstream_running_light::{
+    AmortisedWeights, Blocker, ShadowRay, VirtualLight, Visibility, Vpl, automatic_weights,
+};
+use photonstream_scene::{
+    Geometry, Scene, VplSet, VplVisibility, Weights,
+    bvh::Ray,
+    vpls::{self, moved_normal},
+};
+use std::sync::Arc;
+
+/// Rays begin so far off a VPL along its normal, relative to the radius of the scene: VPLs are placed by hand, too.
+const LIFT: f32 = 2e-4;
+
+/// Rays to a light end so much before it, relative to their length.
+const SHORT_OF_LIGHT: f32 = 1e-4;
+
+/// VPLs and blockers in one version of a scene.
+#[derive(Debug, Default)]
+pub(super) struct Constellation {
+    vpls: Vec<Vpl>,
+    /// The same, a little off their surfaces, for rays.
+    lifted: Vec<Vpl>,
+    blockers: Vec<Blocker>,
+    amortised: AmortisedWeights,
+    /// Comparisons until all weights are those of the present places.
+    steps_left: u64,
+    of: Option<(Arc<VplSet>, Arc<Geometry>)>,
+    has_changed: bool,
+}
+
+impl Constellation {
+    pub(super) fn new(scene: &Scene) -> Self {
+        let mut constellation = Self::default();
+        constellation.follow(scene);
+        constellation
+    }
+
+    /// Goes on to a version of the scene: nothing is done where nothing has moved, but for one step of amortised weights.
+    pub(super) fn follow(&mut self, scene: &Scene) {
+        let is_same = self.of.as_ref().is_some_and(|(set, geometry)| {
+            Arc::ptr_eq(set, &scene.vpls) && Arc::ptr_eq(geometry, &scene.geometry)
+        });
+        self.has_changed = !is_same;
+        let settings = &scene.vpls.settings;
+        if !is_same {
+            let is_first = self.of.is_none();
+            self.of = Some((Arc::clone(&scene.vpls), Arc::clone(&scene.geometry)));
+            self.place(scene);
+            match settings.weights {
+                Weights::Amortised if !is_first => self.steps_left = (self.vpls.len() as u64).pow(2),
+                _ => automatic_weights(&mut self.vpls, settings.area_per_weight),
+            }
+        } else if self.steps_left == 0 {
+            return;
+        }
+        if self.steps_left > 0 {
+            self.amortised.step(&mut self.vpls, settings.area_per_weight);
+            self.steps_left -= 1;
+        }
+        for (vpl, placed) in self.vpls.iter_mut().zip(&scene.vpls.vpls) {
+            vpl.weight = placed.weight.unwrap_or(vpl.weight);
+        }
+        let lift = LIFT * scene.bounds.radius;
+        self.lifted.clear();
+        let lifted = self.vpls.iter().map(|vpl| Vpl { position: vpl.position + vpl.normal * lift, ..*vpl });
+        self.lifted.extend(lifted);
+    }
+
+    /// Whether the last version had other VPLs, or in other places.
+    pub(super) fn has_changed(&self) -> bool {
+        self.has_changed
+    }
+
+    /// Whether weights go on changing in a scene that does not.
+    pub(super) fn is_weighing(&self) -> bool {
+        self.steps_left > 0
+    }
+
+    pub(super) fn vpls(&self) -> &[Vpl] {
+        &self.vpls
+    }
+
+    /// Calls `f` with the VPLs and what stands between them and lights.
+    pub(super) fn with_visibility<T>(
+        &self,
+        scene: &Scene,
+        f: impl FnOnce(&[Vpl], &mut Visibility<'_>) -> T,
+    ) -> T {
+        match scene.vpls.settings.visibility {
+            VplVisibility::None => f(&self.vpls, &mut Visibility::None),
+            VplVisibility::Blockers => f(&self.vpls, &mut Visibility::Blockers(&self.blockers)),
+            VplVisibility::Rays => {
+                let mut ask = |ray: ShadowRay| {
+                    let t_max = ray.distance * (1.0 - SHORT_OF_LIGHT);
+                    let ray = Ray { origin: ray.origin, direction: ray.direction, t_max };
+                    if scene.bvh.occluded(&ray) { 0.0 } else { 1.0 }
+                };
+                f(&self.lifted, &mut Visibility::Asked(&mut ask))
+            }
+        }
+    }
+
+    fn place(&mut self, scene: &Scene) {
+        let VplSet { vpls, blockers, .. } = &*scene.vpls;
+        // Amortised weights stay what they were until they are computed anew.
+        self.vpls.resize(
+            vpls.len(),
+            Vpl { position: Vec3::ZERO, normal: Vec3::Y, albedo: Vec3::ZERO, weight: 1.0 },
+        );
+        for (now, placed) in self.vpls.iter_mut().zip(vpls) {
+            let vpls::Vpl { position, normal, albedo, weight, object } = *placed;
+            let map = scene.world_from_anchor(object);
+            *now = Vpl {
+                position: map.transform_point3(position).as_vec3(),
+                normal: moved_normal(&map.matrix3, normal).as_vec3().normalize_or(Vec3::Y),
+                albedo,
+                weight: weight.unwrap_or(now.weight),
+            };
+        }
+        self.blockers.clear();
+        self.blockers.extend(blockers.iter().map(|blocker| {
+            let map = scene.world_from_anchor(blocker.object);
+            Blocker::new(map.transform_point3(blocker.centre).as_vec3(), blocker.radius)
+        }));
+    }
+}
+
+/// A virtual light as a place that reflects: what a second bounce is made from.
+pub(super) fn as_vpl(light: &VirtualLight) -> Vpl {
+    Vpl { position: light.position, normal: light.normal, albedo: Vec3::ONE, weight: 1.0 }
+}
