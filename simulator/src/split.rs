@@ -110,7 +110,10 @@ impl Simulation {
     pub fn with_split_of(self, other: &Self) -> Self {
         let names = |scene: &Scene| scene.lights.iter().map(|light| light.name.clone()).collect::<Vec<_>>();
         let (scene, like) = (&self.scene, &other.scene);
-        let is_alike = names(scene) == names(like) && scene.streaming.pool_paths == like.streaming.pool_paths;
+        let are_streamed = self.is_streaming() && other.is_streaming();
+        let is_alike = are_streamed
+            && names(scene) == names(like)
+            && scene.streaming.pool_paths == like.streaming.pool_paths;
         let slots = other.emitters.slot_counts();
         if is_alike && slots != self.emitters.slot_counts() { self.with_split(&slots) } else { self }
     }

@@ -357,7 +357,10 @@ impl LedgerActor {
         let still = Arc::clone(&progress.still);
         let patches = progress.patches();
         progress.relative_error = records::relative_error(&vsls.records);
-        let statistics = self.statistics(progress, converged || progress.has_converged());
+        // What goes on by itself has begun to only now.
+        let is_at_rest = progress.paused || !progress.is_on_its_way();
+        let has_converged = is_at_rest && (converged || progress.has_converged());
+        let statistics = self.statistics(progress, has_converged);
         let placements = progress.placements;
         let of_few = progress.few.as_mut().and_then(|few| few.lights.take_changed_maps());
         let maps = match of_few {

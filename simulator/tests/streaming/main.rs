@@ -6,6 +6,7 @@ mod closed_forms;
 mod distance_maps;
 mod edits;
 mod exactness;
+mod few_lights;
 mod placed;
 mod reload;
 mod selective;

@@ -1,0 +1,136 @@
+//! Methods of few lights in a running service, as its readers see them.
+#![allow(clippy::unwrap_used)]
+
+use crate::{
+    edits::values,
+    service::{PATIENCE, start},
+    service_edits::{flux, frame_where, is_converged},
+    support::scene,
+};
+use photonstream_protocol::{Reply, Request, VslFrame};
+use photonstream_scene::{Method, Scene};
+use photonstream_simulator::{few_lights::FewLights, simulation::Simulation};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// A room of 4 m with a spot that shines down, and a VPL on each of floor and left wall.
+fn room(streaming: &str) -> Scene {
+    scene(&format!(
+        "[material.a]\nalbedo = 0.6\n\
+         [object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [4, 4, 4] }}\n\
+         [light.torch]\npower_w = 30\nspot = {{ position_m = [0, 1, 0], direction = [0, -1, 0], outer_half_angle_deg = 25 }}\n\
+         [[vpl]]\nposition_m = [0, -2, 0]\nnormal = [0, 1, 0]\nalbedo = 0.6\nweight = 1\n\
+         [[vpl]]\nposition_m = [-2, 0, 0]\nnormal = [1, 0, 0]\nalbedo = 0.6\nweight = 1\n\
+         [streaming]\nvsls = 60\npool_paths = 2000\npublish_period_ms = 1\n{streaming}\n"
+    ))
+}
+
+fn set_streaming(keys: Value) -> Request {
+    Request::SetStreaming { values: values(keys) }
+}
+
+fn torch(keys: Value) -> Request {
+    Request::SetLight { name: "torch".into(), values: values(keys) }
+}
+
+fn number(reply: &Reply) -> u64 {
+    match reply {
+        Reply::Ok { frame } => *frame,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn expected(scene: &Scene, method: Method) -> Vec<[f32; 3]> {
+    let mut few = FewLights::new(scene, method);
+    few.update(scene, 0.0);
+    few.lights().iter().map(|shown| shown.light.flux.to_array()).collect()
+}
+
+/// The first frame has the whole light, no path is traced, and a light that is dimmed is so in the promised frame.
+#[test]
+fn the_first_frame_is_whole_and_edits_are_instant() {
+    let first = Simulation::new(Arc::new(room("method = \"static-vpl\"")));
+    let service = start("few-first", &first, 1, None);
+    let (mut subscriber, mut client) = (service.attach(), service.connect());
+    let frame = frame_where(&mut subscriber, 1, |_| (), |_| true);
+    assert_eq!(flux(&frame), expected(&first.scene, Method::StaticVpl));
+    assert!(is_converged(&frame) && frame.vsls[0].flux[0] > 0.0 && frame.vsls[1].flux[0] == 0.0);
+    assert_eq!((frame.vsls.len(), frame.patches.len(), frame.statistics.paths_total), (2, 0, 0));
+    let reply = client.request(&torch(json!({ "power_w": 15 })), PATIENCE).unwrap();
+    let dimmed = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
+    let halved = frame.vsls[0].flux[0] * 0.5;
+    assert!((dimmed.vsls[0].flux[0] / halved - 1.0).abs() < 1e-6, "{:?}", flux(&dimmed));
+    let Reply::State { state } = client.request(&Request::Query, PATIENCE).unwrap() else { panic!() };
+    assert_eq!(
+        (&state["method"], &state["vsls"], &state["shining"]),
+        (&json!("static-vpl"), &json!(2), &json!(1))
+    );
+    assert!(state["update_us"].as_f64().unwrap() > 0.0);
+    service.end();
+}
+
+/// A running simulation changes its method, there and back: readers see the lights of each, of photons those of a simulation
+/// of their own.
+#[test]
+fn methods_are_switched_while_it_runs() {
+    let first = Simulation::new(Arc::new(room("")));
+    let streamed = first.fill();
+    let streamed: Vec<[f32; 3]> = streamed.readings(&first.scene).map(|r| r.flux.to_array()).collect();
+    let service = start("few-switch", &first, 2, None);
+    let (mut subscriber, mut client) = (service.attach(), service.connect());
+    let before = frame_where(&mut subscriber, 1, |_| (), is_converged);
+    assert_eq!(flux(&before), streamed);
+    let mut last = before.frame;
+    for method in [Method::StaticVpl, Method::PhantomVpl, Method::InstantRadiosity, Method::PhotonStreaming] {
+        let reply = client.request(&set_streaming(json!({ "method": method.name() })), PATIENCE).unwrap();
+        assert!(number(&reply) > last);
+        let wanted = match method {
+            Method::PhotonStreaming => streamed.clone(),
+            few => expected(&room(&format!("method = \"{}\"", few.name())), few),
+        };
+        assert!(wanted.iter().flatten().any(|&x| x > 0.0));
+        let is_there = |frame: &VslFrame| is_converged(frame) && flux(frame) == wanted;
+        last = frame_where(&mut subscriber, number(&reply), |_| (), is_there).frame;
+    }
+    let reply = client.request(&set_streaming(json!({ "method": "static-vlp" })), PATIENCE).unwrap();
+    assert!(matches!(reply, Reply::Error { .. }), "{reply:?}");
+    service.end();
+}
+
+/// A phantom goes from floor to wall in frames in between, and comes to rest exactly where the axis ends.
+#[test]
+fn phantoms_go_on_in_frames_of_their_own() {
+    let first = Simulation::new(Arc::new(room("method = \"phantom-vpl\"")));
+    let service = start("few-phantom", &first, 1, None);
+    let (mut subscriber, mut client) = (service.attach(), service.connect());
+    let frame = frame_where(&mut subscriber, 1, |_| (), is_converged);
+    assert_eq!(frame.vsls[0].position, [0.0, -2.0, 0.0]);
+    let reply = client.request(&torch(json!({ "direction": [-1, -1, 0] })), PATIENCE).unwrap();
+    let mut on_the_way = 0;
+    let rest = frame_where(
+        &mut subscriber,
+        number(&reply),
+        |frame| on_the_way += u32::from(frame.vsls[0].position[0] > -1.9 && frame.vsls[0].position[0] < -0.1),
+        is_converged,
+    );
+    // The axis from (0, 1, 0) meets the left wall at y = -1: but for the roundings of its direction.
+    let [x, y, z] = rest.vsls[0].position;
+    assert!((x + 2.0).abs() < 1e-6 && (y + 1.0).abs() < 1e-6 && z == 0.0, "{:?}", rest.vsls[0].position);
+    assert!(on_the_way > 0, "24 ms are several frames");
+    service.end();
+}
+
+/// Renderers that shadow by distance maps have them of few lights, too.
+#[test]
+fn few_lights_have_distance_maps() {
+    let first = Simulation::new(Arc::new(room("method = \"static-vpl\"\ndistance_map_px = 16")));
+    let service = start("few-maps", &first, 1, None);
+    let mut subscriber = service.attach();
+    let frame = frame_where(&mut subscriber, 1, |_| (), |_| true);
+    assert_eq!(frame.distances.len(), 2 * 16 * 16 / 32);
+    // The VPL that shines sees the room in all directions, the other one is not traced.
+    let (shining, dark) = frame.distances.split_at(8);
+    assert!(shining.iter().all(|record| record.texels.iter().all(|&t| t & 0xffff != 0 && t >> 16 != 0)));
+    assert!(dark.iter().all(|record| record.texels.iter().all(|&t| t == 0)));
+    service.end();
+}
