@@ -5,14 +5,16 @@ use crate::{
     error::LauncherError,
     output::{self, grouped},
 };
-use photonstream_scene::{Scene, SceneConfig, features::Decision};
+use photonstream_scene::{Method, Scene, SceneConfig, features::Decision};
+use photonstream_simulator::{few_lights, method};
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `photonstream check`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-JSON: { \"scene\", \"scene_hash\", \"objects\", \"triangles\", \"materials\", \"lights\", \"vsls\", \"pool_paths\", \"width_px\",
+JSON: { \"scene\", \"scene_hash\", \"objects\", \"triangles\", \"materials\", \"lights\", \"method\", \"method_reasons\": [texts],
+  \"published_lights\", \"vpls\", \"blockers\", \"proxies\", \"vsls\", \"pool_paths\", \"width_px\",
   \"height_px\", \"kernel\", \"visibility\", \"origin_m\": [x, y, z], \"extent_m\": [x, y, z], \"choices\": [texts], \"notices\": [texts],
   \"decisions\": [ { \"what\", \"modelled\", \"reason\" } ] }")]
 pub(crate) struct Args {
@@ -28,6 +30,12 @@ struct Report {
     triangles: usize,
     materials: usize,
     lights: usize,
+    method: &'static str,
+    method_reasons: Vec<String>,
+    published_lights: usize,
+    vpls: usize,
+    blockers: usize,
+    proxies: usize,
     vsls: u32,
     pool_paths: u32,
     width_px: u32,
@@ -69,6 +77,8 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
 
 fn report(scene: &Scene) -> Report {
     let (lo, hi) = scene.bvh.bounds();
+    let choice = method::choose(scene);
+    let streams = choice.method == Method::PhotonStreaming;
     Report {
         scene: scene.name.clone(),
         scene_hash: format!("{:016x}", scene.hash),
@@ -76,6 +86,15 @@ fn report(scene: &Scene) -> Report {
         triangles: scene.geometry.triangles.len(),
         materials: scene.materials.len(),
         lights: scene.lights.len(),
+        method: choice.method.name(),
+        method_reasons: choice.reasons,
+        published_lights: match streams {
+            true => scene.streaming.vsls as usize,
+            false => few_lights::count(scene, choice.method),
+        },
+        vpls: scene.vpls.vpls.len(),
+        blockers: scene.vpls.blockers.len(),
+        proxies: scene.vpls.proxies.len(),
         vsls: scene.streaming.vsls,
         pool_paths: scene.streaming.pool_paths,
         width_px: scene.render.width,
@@ -90,21 +109,32 @@ fn report(scene: &Scene) -> Report {
     }
 }
 
+/// What carries the light.
+fn light(report: &Report) -> String {
+    if report.method == Method::PhotonStreaming.name() {
+        let (vsls, paths) = (grouped(report.vsls.into()), grouped(report.pool_paths.into()));
+        return format!("{vsls} VSLs, a pool of {paths} paths");
+    }
+    let Report { published_lights, vpls, blockers, proxies, .. } = report;
+    format!("{published_lights} lights of {vpls} VPLs, {blockers} blockers, {proxies} proxies")
+}
+
 fn text(report: &Report) -> String {
     let Report { scene, scene_hash, objects, materials, lights, .. } = report;
     let [x, y, z] = report.extent_m;
     let mut out = format!(
         "{scene} is valid (hash {scene_hash})\n\
          {objects} objects, {} triangles, {materials} materials, {lights} lights; {x:.3} x {y:.3} x {z:.3} m\n\
-         {} VSLs, a pool of {} paths; pictures {} x {}, kernel {}, visibility {}\n",
+         method {}: {}; pictures {} x {}, kernel {}, visibility {}\n",
         grouped(report.triangles as u64),
-        grouped(report.vsls.into()),
-        grouped(report.pool_paths.into()),
+        report.method,
+        light(report),
         report.width_px,
         report.height_px,
         report.kernel,
         report.visibility,
     );
+    out.extend(report.method_reasons.iter().map(|reason| format!("because {reason}\n")));
     out.push_str("modelled:\n");
     out.extend(report.decisions.iter().map(Feature::line));
     out.extend(report.choices.iter().map(|choice| format!("chosen: {choice}\n")));

@@ -25,6 +25,7 @@ use crate::{
     import::AssetRoots,
     placement::Placement,
     scene::{LightId, ObjectId, Scene, SceneLight, StillLight},
+    settings::Method,
     texturing,
 };
 use glam::DVec3;
@@ -128,6 +129,13 @@ impl SceneConfig {
         let mut features = Features::scan(&objects, &lights, &geometry, streaming.light_columns);
         animation.carry(inputs.rigs, &objects);
         (features.moving_objects, features.moving_lights) = animation.moving(&objects, &lights);
+        let lights_vpls = matches!(streaming.method, Method::StaticVpl | Method::PhantomVpl);
+        if sky.is_some() && lights_vpls {
+            let method = streaming.method.name();
+            notices.push(format!(
+                "method {method}: the sky lights no VPL; instant-radiosity and photon-streaming have it"
+            ));
+        }
         notices.extend(steady_state::notice(&features, &objects, &materials));
         let anchors = vpls::Anchors { objects: &objects, rest_meshes: &rest_meshes, origin: origin_m };
         let vpls = vpls::read(&mut self, &root, streaming.method, &anchors)?;
