@@ -15,6 +15,7 @@ pub mod machine;
 pub mod maps;
 pub mod methods;
 pub mod metrics;
+pub mod motion;
 pub mod paper_tables;
 pub mod pareto;
 pub mod plan;

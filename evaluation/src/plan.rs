@@ -2,6 +2,7 @@
 
 use crate::{
     device::Way,
+    methods::few,
     point::{Method, Point},
 };
 use photonstream_scene::{Sampling, Visibility};
@@ -97,12 +98,15 @@ pub const THREADS: &str = "threads";
 pub const ACCUMULATION: &str = "accumulation";
 /// Lights and pools that grow together, drawn by a graphics device.
 pub const GPU: &str = "gpu";
+/// The simulator's methods, as the config says.
+pub const METHODS: &str = "methods";
 /// The scene as its config says.
 pub const CONFIG: &str = "config";
 
 /// All points of a scene but those of path tracing, which go on until the time is over. `base` is the scene as its config
-/// says; equal points are measured once. `ways` are those of the graphics device, its default first; none without a device.
-pub fn plan(base: &Point, effort: Effort, ways: &[Way]) -> Vec<Planned> {
+/// says; equal points are measured once. `ways` are those of the graphics device, its default first; none without a device;
+/// `few` are the methods of few lights that the scene can have.
+pub fn plan(base: &Point, effort: Effort, ways: &[Way], few: &[Point]) -> Vec<Planned> {
     let mut planned: Vec<Planned> = Vec::new();
     let mut add = |sweep: &str, point: Point| {
         let text = point.to_string();
@@ -152,6 +156,20 @@ pub fn plan(base: &Point, effort: Effort, ways: &[Way]) -> Vec<Planned> {
     for &vsls in effort.vsls() {
         add(TIME, Point { method: Method::PaperA, vsls, ..base.clone() });
     }
+    for point in few {
+        add(METHODS, point.clone());
+        if few::method_of(point.method).is_none() {
+            continue;
+        }
+        for visibility in [Visibility::None, Visibility::Rays] {
+            add(TIME, Point { visibility, ..point.clone() });
+        }
+        if point.method == Method::FixedPhotons {
+            for vsls in effort.vsls().iter().map(|n| n / 4) {
+                add(TIME, Point { vsls, visibility: Visibility::Rays, ..point.clone() });
+            }
+        }
+    }
     // Shadow rays go to all lights in one loop: the ways are compared without.
     for way in ways {
         add(ACCUMULATION, on_device(base, way, Visibility::None));
@@ -199,7 +217,10 @@ mod tests {
     fn every_kernel_visibility_and_method_is_there_once() {
         let way = |accumulation: &str, interleave| Way { accumulation: accumulation.into(), interleave };
         let ways = [way("tiled", 1), way("tiled", 4), way("splat", 1)];
-        let planned = plan(&base(), Effort::Default, &ways);
+        let few: Vec<Point> = [Method::StaticVpl, Method::PhantomVpl, Method::FixedPhotons]
+            .map(|method| Point { method, ..base() })
+            .to_vec();
+        let planned = plan(&base(), Effort::Default, &ways, &few);
         let texts: Vec<String> = planned.iter().map(|p| p.point.to_string()).collect();
         for (i, text) in texts.iter().enumerate() {
             assert!(!texts[..i].contains(text), "{text} is measured twice");
@@ -220,7 +241,7 @@ mod tests {
             })
         };
         assert!(ways.iter().all(drawn));
-        let without = plan(&base(), Effort::Default, &[]);
+        let without = plan(&base(), Effort::Default, &[], &[]);
         assert!(without.iter().all(|p| p.point.method != Method::PhotonStreamingGpu));
         // The config's own point is in every sweep of one setting.
         let own = &planned[0];

@@ -19,19 +19,28 @@ pub enum Method {
     InstantRadiosity,
     /// The same, bounded: 1/(π (r² + c²)), c the radius of the disc that is a light's share of the surfaces.
     InstantRadiosityBounded,
+    /// Predefined virtual point lights: paper B §4.1.
+    StaticVpl,
+    /// One where the axis of each spot ends, instead: paper B §4.3.
+    PhantomVpl,
+    /// One where each of a few photons of fixed directions ends: paper B §5.3.4.
+    FixedPhotons,
     /// Paper A as written: f32, point kernel, no visibility, a stream of fresh impacts, the oldest taken back.
     PaperA,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 10] = [
         Self::PhotonStreaming,
         Self::PhotonStreamingGpu,
         Self::PathTracing,
         Self::PathTracingDenoised,
         Self::InstantRadiosity,
         Self::InstantRadiosityBounded,
+        Self::StaticVpl,
+        Self::PhantomVpl,
+        Self::FixedPhotons,
         Self::PaperA,
     ];
 
@@ -44,6 +53,9 @@ impl Method {
             Self::PathTracingDenoised => "path-tracing-denoised",
             Self::InstantRadiosity => "instant-radiosity",
             Self::InstantRadiosityBounded => "instant-radiosity-bounded",
+            Self::StaticVpl => "static-vpl",
+            Self::PhantomVpl => "phantom-vpl",
+            Self::FixedPhotons => "instant-radiosity-fixed",
             Self::PaperA => "paper-a",
         }
     }
@@ -69,6 +81,10 @@ impl Method {
             Self::InstantRadiosity | Self::InstantRadiosityBounded => {
                 &["vsls", "visibility", "light_samples", "threads", "seed"]
             }
+            Self::StaticVpl | Self::PhantomVpl => {
+                &["kernel", "visibility", "light_samples", "threads", "seed"]
+            }
+            Self::FixedPhotons => &["vsls", "kernel", "visibility", "light_samples", "threads", "seed"],
             Self::PaperA => &["vsls", "pool", "light_samples", "threads", "seed"],
         }
     }

@@ -1,6 +1,6 @@
 //! Turns measurements into rows of a table, and rows into CSV and JSON.
 
-use crate::{EvaluateError, hard_cases::Checked, machine::Machine};
+use crate::{EvaluateError, hard_cases::Checked, machine::Machine, motion::MethodLine};
 use photonstream_simulator::bench::EventFigures;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -163,6 +163,8 @@ pub struct Results {
     pub splits: Vec<Split>,
     /// How fast light follows changes.
     pub changes: Vec<StepChange>,
+    /// The simulator's methods, a line each.
+    pub methods: Vec<MethodLine>,
     /// Hard cases that were run here.
     pub hard_cases: Vec<Checked>,
     /// What was left out.
@@ -181,6 +183,7 @@ impl Results {
             rows: Vec::new(),
             splits: Vec::new(),
             changes: Vec::new(),
+            methods: Vec::new(),
             hard_cases: Vec::new(),
             skipped: Vec::new(),
         }

@@ -24,14 +24,21 @@ enum Kind {
     Object,
     Material,
     Streaming,
+    Vpls,
 }
 
 impl Kind {
-    const ALL: [(&'static str, Self); 4] = [
+    /// Whether there is only one of it, without a name.
+    fn is_single(self) -> bool {
+        matches!(self, Self::Streaming | Self::Vpls)
+    }
+
+    const ALL: [(&'static str, Self); 5] = [
         ("light", Self::Light),
         ("object", Self::Object),
         ("material", Self::Material),
         ("streaming", Self::Streaming),
+        ("vpls", Self::Vpls),
     ];
 
     fn request(self, name: String, values: Map<String, Value>) -> Request {
@@ -40,6 +47,9 @@ impl Kind {
             Self::Object => Request::MoveObject { name, values },
             Self::Material => Request::SetMaterial { name, values },
             Self::Streaming => Request::SetStreaming { values },
+            Self::Vpls => {
+                Request::SetVpls { values: [("vpls".to_owned(), values.into())].into_iter().collect() }
+            }
         }
     }
 }
@@ -51,6 +61,7 @@ pub(crate) fn title(request: &Request) -> String {
         Request::MoveObject { name, .. } => format!("object.{name}"),
         Request::SetMaterial { name, .. } => format!("material.{name}"),
         Request::SetStreaming { .. } => "streaming".into(),
+        Request::SetVpls { .. } => "vpls".into(),
         Request::Pause => "pause".into(),
         Request::Resume => "resume".into(),
         Request::Step => "step".into(),
@@ -129,11 +140,11 @@ impl Assignment {
                 &format!("expected one of {names}"),
             ));
         };
-        let name = if kind == Kind::Streaming { Some(String::new()) } else { parts.next() };
+        let name = if kind.is_single() { Some(String::new()) } else { parts.next() };
         let path: Vec<String> = parts.collect();
         let (Some(name), false) = (name, path.is_empty()) else {
             let example = match kind {
-                Kind::Streaming => "streaming.KEY=VALUE".to_owned(),
+                _ if kind.is_single() => format!("{first}.KEY=VALUE"),
                 _ => format!("{first}.NAME.KEY=VALUE"),
             };
             return Err(wrong(equals, "the key is not complete".into(), &format!("write {example}")));

@@ -8,6 +8,7 @@ use crate::{
     hard_cases::{CLOSED_FORMS, SAMPLES, run as run_closed_form},
     machine::Machine,
     methods::{Bench, denoised},
+    motion,
     plan::{self, Effort, Planned},
     point::Point,
     report::{self, SceneSheet},
@@ -128,8 +129,8 @@ fn scene(
     sheets: &mut Vec<SceneSheet>,
 ) -> Result<(), EvaluateError> {
     let mut loaded = SceneConfig::from_file(config)?.build()?;
-    // A moving scene is measured as it is loaded.
-    loaded.animation = Arc::default();
+    // A moving scene is measured as it is loaded, but for its flicker.
+    let animation = std::mem::take(&mut loaded.animation);
     loaded.streaming.seed = options.seed.unwrap_or(loaded.streaming.seed);
     let scene = Arc::new(loaded);
     let size = options.size.unwrap_or_else(|| fitted(&scene, options.effort.pixels()));
@@ -154,12 +155,14 @@ fn scene(
         }
         return Ok(());
     }
-    let planned = plan::plan(&base, options.effort, &ways);
+    let methods = motion::methods(&run.bench.scene, &base);
+    let planned = plan::plan(&base, options.effort, &ways, &methods);
     let count = planned.len() as f64;
     for (index, planned) in planned.iter().enumerate() {
         (observer.progress)(0.15 + 0.45 * index as f64 / count, &planned.point.to_string());
         run.point(planned, sheets)?;
     }
+    run.methods(&animation)?;
     run.path_tracing(&base, sheets)?;
     run.splits(&base)?;
     run.changes(&base)

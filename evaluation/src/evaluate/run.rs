@@ -7,6 +7,7 @@ use crate::{
     flip::{Exposure, flip},
     methods::{Bench, Shot, denoised},
     metrics::compare,
+    motion::{self, MethodLine},
     plan::{self, Effort, Planned},
     point::{Method, Point},
     report::{Portrait, SceneSheet},
@@ -15,8 +16,8 @@ use crate::{
     truth::{Truth, truth},
 };
 use photonstream_protocol::clean_one;
-use photonstream_renderer::{LayerKind, RenderError};
-use photonstream_scene::Visibility;
+use photonstream_renderer::{LayerKind, RenderError, RenderOptions};
+use photonstream_scene::{Animation, Visibility};
 use photonstream_shading::Kernel;
 use photonstream_simulator::bench::{DynamicOptions, run_dynamic};
 use std::{path::Path, sync::Arc};
@@ -168,6 +169,31 @@ impl Run<'_, '_> {
                 &self.device.as_ref().map_or(String::new(), |d| d.arguments()),
             ),
         })
+    }
+
+    /// A line for each of the simulator's methods, with their flicker in pictures of a quarter of the pixels.
+    pub(super) fn methods(&mut self, animation: &Animation) -> Result<(), EvaluateError> {
+        let scene = Arc::clone(&self.bench.scene);
+        let hash = format!("{:016x}", scene.hash);
+        let size = fitted(&scene, self.truth.film.width() * self.truth.film.height() / 4);
+        let mut bench = Bench::new(Arc::clone(&scene), size);
+        let frames = if self.options.effort == Effort::Quick { 6 } else { 16 };
+        let base = Point::of_scene(&scene, self.results.machine.cores.max(1));
+        for point in motion::methods(&scene, &base) {
+            let is_own = |row: &&Row| {
+                row.scene_hash == hash
+                    && row.method == point.method.name()
+                    && row.sweeps.split(' ').any(|s| s == plan::METHODS)
+            };
+            let Some(row) = self.results.rows.iter().find(is_own).cloned() else { continue };
+            (self.observer.progress)(0.6, &format!("flicker: {}", point.method));
+            let options = RenderOptions { layers: vec![LayerKind::Indirect], ..bench.options(&point) };
+            let watch = self.observer.watch();
+            let flicker = motion::flicker_of(&mut bench, &point, animation, frames, &options, watch)?;
+            self.results.methods.push(MethodLine::of_row(&row, flicker));
+            self.results.write(&self.options.out)?;
+        }
+        Ok(())
     }
 
     /// Path tracing with more and more paths, until the time is over.

@@ -1,6 +1,7 @@
 //! Turns a point into a picture and the time it takes: each method on the same scene, rays and cores.
 
 pub(crate) mod denoised;
+pub(crate) mod few;
 mod instant_radiosity;
 mod on_device;
 mod paper_a;
@@ -131,6 +132,13 @@ impl Bench {
                 let (vsls, light_ms) = lights_of(simulation)?;
                 (vsls, *place_ms, light_ms)
             }
+            (method, _) if few::method_of(method).is_some() => {
+                let (vsls, shining, light_ms) = few::lights(scene, point)?;
+                let begun = Instant::now();
+                let film = self.picture(point, &vsls, watch)?;
+                let picture_ms = begun.elapsed().as_secs_f64() * 1e3;
+                return Ok((film, Times { place_ms: 0.0, light_ms, picture_ms }, Some(shining)));
+            }
             _ => {
                 let is_bounded = point.method == Method::InstantRadiosityBounded;
                 let vsls = instant_radiosity::lights(scene, point.vsls, point.seed, is_bounded)?;
@@ -147,7 +155,7 @@ impl Bench {
         Ok(render(&self.scene, vsls, &self.options(point), watch)?.film)
     }
 
-    fn options(&self, point: &Point) -> RenderOptions {
+    pub(crate) fn options(&self, point: &Point) -> RenderOptions {
         let mut options = RenderOptions::from_settings(&self.scene.render);
         (options.width, options.height) = self.size;
         options.layers = vec![LayerKind::Full, LayerKind::Indirect];

@@ -5,6 +5,7 @@ mod again;
 mod bars;
 mod charts;
 mod choose;
+mod few_lights;
 mod hard_cases;
 mod page;
 mod portrait;

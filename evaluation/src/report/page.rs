@@ -1,6 +1,6 @@
 //! Turns results into the text of the page.
 
-use super::{SceneSheet, escape, hard_cases, scene_section};
+use super::{SceneSheet, escape, few_lights, hard_cases, scene_section};
 use crate::{EvaluateError, results::Results};
 
 const STYLE: &str = include_str!("style.css");
@@ -43,20 +43,24 @@ pub(super) fn page(results: &Results, sheets: &[SceneSheet]) -> Result<String, E
          <p>{cpu}, {cores} cores; {adapter}; commit <code>{commit}</code>; {points} points in {seconds:.0} s. \
          Tables as files: <a href=\"results.csv\">results.csv</a>, <a href=\"results.json\">results.json</a>.</p>\
          <p>All of it again: <code>{command}</code></p>\
-         <nav aria-label=\"Sections\"><ul>{links}<li><a href=\"#hard-cases\">Hard cases</a></li><li><a href=\"#how\">How it is measured</a></li>\
+         <nav aria-label=\"Sections\"><ul>{links}{methods_link}<li><a href=\"#hard-cases\">Hard cases</a></li><li><a href=\"#how\">How it is measured</a></li>\
          <li><a href=\"#skipped\">What was left out</a></li></ul></nav></header>\
-         <main id=\"main\" tabindex=\"-1\">{state}{sections}{hard_cases}{HOW}\
+         <main id=\"main\" tabindex=\"-1\">{state}{sections}{methods}{hard_cases}{HOW}\
          <section id=\"skipped\"><h2>What was left out, and why</h2><ul>{skipped}</ul></section></main></body></html>\n",
         cpu = escape(&machine.cpu),
         cores = machine.cores,
+        methods_link = if results.methods.is_empty() { "" } else { METHODS_LINK },
         adapter = results.adapter.as_ref().map_or("no graphics device".into(), |name| escape(name)),
         command = escape(&results.command),
         commit = escape(&machine.commit),
         points = results.rows.len(),
         seconds = results.seconds,
+        methods = few_lights::section(&results.methods, &results.command),
         hard_cases = hard_cases::section(&results.hard_cases),
     ))
 }
+
+const METHODS_LINK: &str = "<li><a href=\"#methods\">Methods of the simulator</a></li>";
 
 const HOW: &str = "<section id=\"how\"><h2>How it is measured</h2>\
 <ul><li>All errors are in linear radiance, a against the reference b, over all pixels and channels: relative RMSE = \

@@ -47,6 +47,9 @@ pub(super) fn kind(row: &Row) -> String {
         _ if method == Method::PathTracingDenoised.name() => "Path tracing, denoised".into(),
         _ if method == Method::InstantRadiosity.name() => "Instant radiosity".into(),
         _ if method == Method::InstantRadiosityBounded.name() => "Instant radiosity, bounded".into(),
+        _ if method == Method::StaticVpl.name() => "Static VPLs".into(),
+        _ if method == Method::PhantomVpl.name() => "Phantom VPLs".into(),
+        _ if method == Method::FixedPhotons.name() => "Photons of fixed directions".into(),
         _ if method == Method::PaperA.name() => "Paper A as written".into(),
         other => other.into(),
     }

@@ -47,6 +47,12 @@ pub enum Request {
         /// New values by key.
         values: Map<String, Value>,
     },
+    /// Replace the virtual point lights, blockers, proxies or settings of a method of few lights, by the tables of the
+    /// configuration.
+    SetVpls {
+        /// Any of `vpl`, `blocker` and `proxy`, each a list of tables, and `vpls`, a table.
+        values: Map<String, Value>,
+    },
     /// Change streaming settings, by the keys of the configuration.
     SetStreaming {
         /// New values by key.
@@ -87,7 +93,7 @@ impl Reply {
 }
 
 /// Types of requests, for the message to those who sent another one.
-const REQUEST_TYPES: &str = "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_material, set_streaming";
+const REQUEST_TYPES: &str = "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_material, set_vpls, set_streaming";
 
 impl Request {
     /// Parses one message; the error is the reply that its sender gets.
@@ -117,6 +123,7 @@ mod tests {
             Request::Pause,
             Request::SetLight { name: "lamp".into(), values: values.clone() },
             Request::SetMaterial { name: "red".into(), values: values.clone() },
+            Request::SetVpls { values: values.clone() },
             Request::SetStreaming { values },
         ] {
             assert_eq!(Request::parse(&encode(&request).unwrap()).unwrap(), request);

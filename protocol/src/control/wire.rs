@@ -1,7 +1,7 @@
 //! Turns a stream of bytes into messages: four bytes of length (little-endian), then that many bytes of JSON.
 
 /// Greatest message, in bytes.
-pub(crate) const MAX_MESSAGE: usize = 64 * 1024;
+pub(crate) const MAX_MESSAGE: usize = 256 * 1024;
 
 /// What the bytes received so far start with.
 #[derive(Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub(crate) fn put_message(buffer: &mut Vec<u8>, message: &[u8]) -> bool {
     if message.len() > MAX_MESSAGE {
         return false;
     }
-    // At most 64 KiB, see above.
+    // At most 256 KiB, see above.
     buffer.extend_from_slice(&(message.len() as u32).to_le_bytes());
     buffer.extend_from_slice(message);
     true

@@ -13,7 +13,7 @@ mod objects;
 mod settings;
 pub(crate) mod sky;
 mod steady_state;
-mod vpls;
+pub(crate) mod vpls;
 
 use crate::{
     animation::{self, Rig},
@@ -27,6 +27,7 @@ use crate::{
     scene::{LightId, ObjectId, Scene, SceneLight, StillLight},
     settings::Method,
     texturing,
+    vpls::VplTables,
 };
 use glam::DVec3;
 pub(crate) use lights::not_one_of;
@@ -138,7 +139,8 @@ impl SceneConfig {
         }
         notices.extend(steady_state::notice(&features, &objects, &materials));
         let anchors = vpls::Anchors { objects: &objects, rest_meshes: &rest_meshes, origin: origin_m };
-        let vpls = vpls::read(&mut self, &root, streaming.method, &anchors)?;
+        let vpls = vpls::read(VplTables::of(&self), &root, streaming.method, &anchors)?;
+        vpls.tables.clone().write(&mut self);
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents, inputs.sky_content.as_ref());
         let mut scene = Scene {
             name,

@@ -2,13 +2,13 @@
 
 use super::{lights::not_one_of, settings::widen};
 use crate::{
-    config::{Field, ProxyConfig, SceneConfig, Vector, VplsConfig},
+    config::{Field, ProxyConfig, Vector, VplsConfig},
     error::{SceneError, nearest},
     placement::Placement,
     pose::RestMesh,
     scene::{Object, ObjectId},
     settings::{Method, PhantomSurfaces, VplSettings},
-    vpls::{Blocker, MOST_POINTS, Proxy, ProxyShape, Vpl, VplSet, hull, moved_normal},
+    vpls::{Blocker, MOST_POINTS, Proxy, ProxyShape, Vpl, VplSet, VplTables, hull, moved_normal},
 };
 use glam::{DAffine3, DVec3};
 
@@ -16,10 +16,10 @@ use glam::{DAffine3, DVec3};
 const MOST_LIGHTS: u32 = 100_000;
 
 /// A scene's objects as loaded, and where the scene's space lies.
-pub(super) struct Anchors<'a> {
-    pub(super) objects: &'a [Object],
-    pub(super) rest_meshes: &'a [RestMesh],
-    pub(super) origin: DVec3,
+pub(crate) struct Anchors<'a> {
+    pub(crate) objects: &'a [Object],
+    pub(crate) rest_meshes: &'a [RestMesh],
+    pub(crate) origin: DVec3,
 }
 
 impl Anchors<'_> {
@@ -47,9 +47,9 @@ impl Anchors<'_> {
     }
 }
 
-/// Reads the tables, and writes their defaults into the config where it has any of them or a method that needs them.
-pub(super) fn read(
-    config: &mut SceneConfig,
+/// Validates tables, and writes their defaults into them where there are any, or a method that needs them.
+pub(crate) fn read(
+    mut config: VplTables,
     root: &Field<'_>,
     method: Method,
     anchors: &Anchors<'_>,
@@ -63,6 +63,7 @@ pub(super) fn read(
         None => VplSettings::default(),
     };
     let mut set = VplSet { settings, ..VplSet::default() };
+    let config = &mut config;
     for (number, vpl) in config.vpl.iter().enumerate() {
         let field = root.key("vpl").element(number);
         let (object, map) = anchors.find(vpl.object.as_ref(), &field)?;
@@ -94,6 +95,7 @@ pub(super) fn read(
         set.proxies.push(Proxy { anchor_from_own: map * config_from_own, shape, object });
     }
     check(&set, method, root)?;
+    set.tables = std::mem::take(config);
     Ok(set)
 }
 

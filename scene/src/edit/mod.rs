@@ -5,6 +5,7 @@ mod material;
 mod object;
 mod place;
 mod values;
+mod vpls;
 
 use crate::{
     bake::{self, Emitting, mesh_shape},
@@ -87,6 +88,15 @@ impl SceneEdit {
     /// If there is no such material or key, or the albedo is not within [0, 1]; nothing is changed then.
     pub fn set_material(&mut self, name: &str, values: &Values) -> Result<MaterialId, SceneError> {
         material::set(&mut self.scene, name, values)
+    }
+
+    /// Replaces the tables `vpl`, `blocker` and `proxy` of a config that are given, each as a whole, and those settings of `vpls`;
+    /// what is not given stays. Positions are those of the scene as it is loaded, in the config's coordinates.
+    ///
+    /// # Errors
+    /// If a key or value is not valid, or the method has nothing left that it needs; nothing is changed then.
+    pub fn set_vpls(&mut self, values: &Values) -> Result<(), SceneError> {
+        vpls::set(&mut self.scene, values)
     }
 
     /// Moves and scales an object; see [`Scene::with_object_placed`].

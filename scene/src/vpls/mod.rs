@@ -3,8 +3,10 @@
 mod carry;
 mod hull;
 mod proxy;
+mod tables;
 
 pub use proxy::{Proxy, ProxyShape};
+pub use tables::VplTables;
 
 use crate::{
     scene::{ObjectId, Scene},
@@ -27,6 +29,8 @@ pub struct VplSet {
     pub blockers: Vec<Blocker>,
     /// Bodies in the place of the scene, for the axes of spots.
     pub proxies: Vec<Proxy>,
+    /// What all of it was read from, with all defaults.
+    pub tables: VplTables,
 }
 
 /// A predefined virtual point light.

@@ -43,6 +43,9 @@ impl Maps {
         }
         let empty: Map = vec![0; words(self.edge)].into();
         let edge = self.edge;
+        if self.maps.len() != lights.len() {
+            self.changed.extend(0..lights.len() as u32);
+        }
         self.maps.resize_with(lights.len(), || Traced { at: None, map: Arc::clone(&empty) });
         let traced =
             self.maps.par_iter_mut().zip(lights).enumerate().filter_map(|(number, (traced, shown))| {
@@ -70,6 +73,7 @@ impl Maps {
         let mut changed = std::mem::take(&mut self.changed);
         changed.sort_unstable();
         changed.dedup();
+        changed.retain(|&number| (number as usize) < self.maps.len());
         let changed =
             changed.into_iter().map(|number| (number, Arc::clone(&self.maps[number as usize].map))).collect();
         Some(MapsChanged { edge: self.edge, lights: self.maps.len(), changed })

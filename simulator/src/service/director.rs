@@ -271,7 +271,8 @@ impl Director {
             Request::Hello { .. }
             | Request::SetLight { .. }
             | Request::MoveObject { .. }
-            | Request::SetMaterial { .. } => {
+            | Request::SetMaterial { .. }
+            | Request::SetVpls { .. } => {
                 Reply::error("internal", "the request should have been answered before")
             }
         };

@@ -78,6 +78,7 @@ fn apply(edit: &mut SceneEdit, request: &Request) -> Option<Result<(), SceneErro
         Request::SetLight { name, values } => Some(edit.set_light(name, values).map(|_| ())),
         Request::MoveObject { name, values } => Some(edit.move_object(name, values).map(|_| ())),
         Request::SetMaterial { name, values } => Some(edit.set_material(name, values).map(|_| ())),
+        Request::SetVpls { values } => Some(edit.set_vpls(values)),
         _ => None,
     }
 }

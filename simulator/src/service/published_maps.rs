@@ -56,7 +56,8 @@ impl PublishedMaps {
             *self = Self::default();
             return;
         };
-        if self.placement != Some(update.placement) {
+        // Few lights may become more or fewer where they are.
+        if self.placement != Some(update.placement) || self.records.len() != update.records() {
             let records = vec![DistanceRecord::default(); update.records()];
             let changed = ChunkSet::all(records.len());
             *self = Self { placement: Some(update.placement), each: update.each, records, changed };

@@ -25,13 +25,15 @@ pub(super) fn with_settings(scene: &Scene, values: &Map<String, Value>) -> Resul
     }
     let mut config = SceneConfig::from_text(&scene.resolved_text, Path::new(""))?;
     let mut settings = serde_json::to_value(&config.streaming)?;
+    // As edits have made them.
+    scene.vpls.tables.clone().write(&mut config);
     if let Value::Object(settings) = &mut settings {
         settings.extend(values.clone());
     }
     config.streaming = serde_json::from_value(settings)?;
     let built = config.build()?;
     let mut next = scene.clone();
-    next.streaming = built.streaming;
+    (next.streaming, next.vpls) = (built.streaming, built.vpls);
     (next.resolved_text, next.hash) = (built.resolved_text, built.hash);
     Ok(next)
 }

@@ -97,6 +97,44 @@ fn methods_are_switched_while_it_runs() {
     service.end();
 }
 
+/// VPLs are moved, added and taken away while it runs, and settings changed; what makes no sense changes nothing.
+#[test]
+fn vpls_are_edited_while_it_runs() {
+    let first = Simulation::new(Arc::new(room("method = \"static-vpl\"\ndistance_map_px = 8")));
+    let service = start("few-edited", &first, 1, None);
+    let (mut subscriber, mut client) = (service.attach(), service.connect());
+    let before = frame_where(&mut subscriber, 1, |_| (), |_| true);
+    let vpl = |x: f64| json!({ "position_m": [x, -2, 0], "normal": [0, 1, 0], "albedo": 0.6, "weight": 1 });
+    let set = |keys: Value| Request::SetVpls { values: values(keys) };
+    let three = json!({ "vpl": [vpl(0.0), vpl(0.5), vpl(1.9)], "vpls": { "second_bounce_distance_m": 2 } });
+    let reply = client.request(&set(three), PATIENCE).unwrap();
+    let more = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
+    assert_eq!((more.vsls.len(), more.distances.len()), (3 + 1, 4 * 2));
+    assert_eq!(more.vsls[0].flux, before.vsls[0].flux);
+    assert_eq!(
+        (more.vsls[1].position, more.vsls[2].flux),
+        ([0.5, -2.0, 0.0], [0.0; 3]),
+        "1.9 is beyond the cone"
+    );
+    assert!(more.vsls[1].flux[0] > 0.0 && more.vsls[3].flux[0] > 0.0);
+    for (wrong, says) in [
+        (json!({ "vpl": [] }), "photonstream place"),
+        (json!({ "vpls": { "photons": 0 } }), "photons"),
+        (json!({ "vpls": { "fotons": 1 } }), "fotons"),
+        (json!({ "vlp": [] }), "vlp"),
+    ] {
+        match client.request(&set(wrong), PATIENCE).unwrap() {
+            Reply::Error { message, .. } => assert!(message.contains(says), "{says}: {message}"),
+            other => panic!("{other:?}"),
+        }
+    }
+    // Other settings keep what was edited.
+    let reply = client.request(&set_streaming(json!({ "publish_period_ms": 2 })), PATIENCE).unwrap();
+    let kept = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
+    assert_eq!(flux(&kept), flux(&more));
+    service.end();
+}
+
 /// A phantom goes from floor to wall in frames in between, and comes to rest exactly where the axis ends.
 #[test]
 fn phantoms_go_on_in_frames_of_their_own() {

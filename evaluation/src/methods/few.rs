@@ -1,0 +1,82 @@
+//! Turns a scene into the virtual lights of a method of few lights, as the simulator publishes them.
+
+use super::photon_streaming;
+use crate::{
+    EvaluateError,
+    point::{Method, Point},
+};
+use photonstream_renderer::VslSet;
+use photonstream_scene::{Method as SceneMethod, Scene, StreamingSettings, Visibility};
+use photonstream_simulator::{few_lights::FewLights, records};
+use std::sync::Arc;
+
+/// Updates of which the median time counts; one before them warms up.
+const UPDATES: usize = 9;
+
+/// The method of the simulator that a method of few lights measures.
+pub(crate) fn method_of(method: Method) -> Option<SceneMethod> {
+    match method {
+        Method::StaticVpl => Some(SceneMethod::StaticVpl),
+        Method::PhantomVpl => Some(SceneMethod::PhantomVpl),
+        Method::FixedPhotons => Some(SceneMethod::InstantRadiosity),
+        _ => None,
+    }
+}
+
+/// Whether a scene has what a method of few lights needs.
+pub(crate) fn is_possible(scene: &Scene, method: Method) -> bool {
+    let has_vpls = !scene.vpls.vpls.is_empty();
+    let has_spots =
+        scene.lights.iter().any(|l| matches!(l.light.shape, photonstream_shading::LightShape::Spot { .. }));
+    match method {
+        Method::StaticVpl => has_vpls,
+        Method::PhantomVpl => has_vpls && has_spots,
+        _ => true,
+    }
+}
+
+/// `scene` with the settings of `point`: photons, seed, and maps where renderers shadow by them.
+pub(crate) fn with_settings(scene: &Scene, point: &Point) -> Scene {
+    let mut scene = scene.clone();
+    if point.method == Method::FixedPhotons {
+        let mut vpls = photonstream_scene::VplSet::clone(&scene.vpls);
+        vpls.settings.photons = point.vsls;
+        scene.vpls = Arc::new(vpls);
+    }
+    scene.streaming.seed = point.seed;
+    scene.streaming.distance_map_px = match point.visibility {
+        Visibility::Octahedral => StreamingSettings::default_distance_map_px(1),
+        _ => 0,
+    };
+    scene
+}
+
+/// The lights that shine of `few`, in the present state.
+pub(crate) fn vsls_of(few: &FewLights) -> Result<VslSet, EvaluateError> {
+    let distances = records::distance_records(&few.distance_maps());
+    Ok(VslSet::from_records(&few.records(0))?.with_distances(&distances))
+}
+
+/// The lights, their number, and the time that an update takes, ms: the median of several.
+pub(super) fn lights(scene: &Scene, point: &Point) -> Result<(VslSet, usize, f64), EvaluateError> {
+    let method = method_of(point.method).expect("invariant: a method of few lights");
+    let scene = with_settings(scene, point);
+    let mut few = FewLights::new(&scene, method);
+    few.update(&scene, 0.0);
+    let mut times: Vec<f64> = (0..UPDATES)
+        .map(|_| {
+            few.update(&scene, 0.0);
+            few.update_us()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    Ok((vsls_of(&few)?, few.shining(), times[UPDATES / 2] * 1e-3))
+}
+
+/// The lights of a whole pool in `scene`, a version of that of `base`.
+pub(crate) fn streamed(
+    base: &photonstream_simulator::simulation::Simulation,
+    scene: Scene,
+) -> Result<VslSet, EvaluateError> {
+    photon_streaming::lights_of(&base.with_scene(Arc::new(scene))).map(|(vsls, _)| vsls)
+}
