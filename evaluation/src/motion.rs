@@ -92,7 +92,7 @@ pub fn flicker_of(
     }
     let scene = few::with_settings(&bench.scene, point);
     let mut method = match few::method_of(point.method) {
-        Some(method) => Lights::Few(FewLights::new(&scene, method)),
+        Some(method) => Lights::Few(Box::new(FewLights::new(&scene, method))),
         None => Lights::Streamed(Box::new(bench.simulation(point))),
     };
     // The beginning is often a rest: a third of the way in, something moves.
@@ -110,7 +110,7 @@ pub fn flicker_of(
 }
 
 enum Lights {
-    Few(FewLights),
+    Few(Box<FewLights>),
     Streamed(Box<photonstream_simulator::simulation::Simulation>),
 }
 
