@@ -53,6 +53,8 @@ pub enum Request {
         /// Any of `vpl`, `blocker` and `proxy`, each a list of tables, and `vpls`, a table.
         values: Map<String, Value>,
     },
+    /// Write the virtual point lights, blockers and proxies into the configuration that is simulated.
+    SaveVpls {},
     /// Change streaming settings, by the keys of the configuration.
     SetStreaming {
         /// New values by key.
@@ -93,7 +95,7 @@ impl Reply {
 }
 
 /// Types of requests, for the message to those who sent another one.
-const REQUEST_TYPES: &str = "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_material, set_vpls, set_streaming";
+const REQUEST_TYPES: &str = "hello, pause, resume, step, reload, query, shutdown, set_light, move_object, set_material, set_vpls, save_vpls, set_streaming";
 
 impl Request {
     /// Parses one message; the error is the reply that its sender gets.
@@ -124,6 +126,7 @@ mod tests {
             Request::SetLight { name: "lamp".into(), values: values.clone() },
             Request::SetMaterial { name: "red".into(), values: values.clone() },
             Request::SetVpls { values: values.clone() },
+            Request::SaveVpls {},
             Request::SetStreaming { values },
         ] {
             assert_eq!(Request::parse(&encode(&request).unwrap()).unwrap(), request);

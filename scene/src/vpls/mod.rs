@@ -3,6 +3,7 @@
 mod carry;
 mod hull;
 mod proxy;
+mod save;
 mod tables;
 
 pub use proxy::{Proxy, ProxyShape};

@@ -1,5 +1,6 @@
 //! Turns requests and signals into what the actors do, from their start to their end.
 
+mod saving;
 mod scenes;
 mod start;
 #[cfg(test)]
@@ -20,6 +21,7 @@ use crate::{counters::Counters, error::SimulatorError, simulation::Simulation};
 use photonstream_protocol::{ChannelName, ControlServer, Incoming, ProtocolError, Replier, Reply, Request};
 use serde::Serialize;
 use std::{
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -120,6 +122,8 @@ struct Director {
     animated_s: f64,
     /// Why the animation stood still last.
     animation_error: String,
+    /// The file of the scene, if it is one that can be written.
+    config_file: Option<PathBuf>,
     /// Hash of the config that was loaded last.
     loaded_hash: u64,
     news: flume::Receiver<News>,
@@ -264,6 +268,7 @@ impl Director {
                 self.reload(replier);
                 return None;
             }
+            Request::SaveVpls {} => self.save_vpls(),
             Request::SetStreaming { values } => {
                 self.set_streaming(&values, replier);
                 return None;

@@ -1,6 +1,6 @@
 //! Turns a simulation into actors that run, joined by channels.
 
-use super::{Director, Loader, Options, scenes};
+use super::{Director, Loader, Options, saving, scenes};
 use crate::{
     error::SimulatorError,
     records,
@@ -137,6 +137,7 @@ impl Director {
             scene_name: scene.name.clone(),
             clock: scenes::clock(&scene),
             animated_s: 0.0,
+            config_file: options.config.as_ref().and_then(|source| saving::writable(&source.path)),
             loaded_hash: scene.hash,
             animation_error: String::new(),
             news,

@@ -1,0 +1,232 @@
+//! Turns a set of VPLs, blockers and proxies, and the text of a config, into the text that says so: all else of it stays,
+//! comments and order, too.
+
+use super::{VplSet, VplTables};
+use crate::{
+    SceneConfig, SceneError,
+    config::{Field, ProxyConfig, Vector, VplsConfig},
+    settings::PhantomSurfaces,
+};
+use serde::Serialize;
+use std::path::Path;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
+
+impl VplSet {
+    /// The text of a config with the tables of this set in the place of its own: entries that are the same stay as they are
+    /// written, those that differ keep their comments.
+    ///
+    /// # Errors
+    /// If `text`, which is that of `file`, is no config.
+    pub fn written_into(&self, text: &str, file: &Path) -> Result<String, SceneError> {
+        let config = SceneConfig::from_text(text, file)?;
+        let unreadable = |error: toml_edit::TomlError| SceneError::WrongType {
+            place: Field::root(&config.document).place(),
+            problem: error.to_string(),
+        };
+        let mut document: DocumentMut = text.parse().map_err(unreadable)?;
+        let VplTables { vpls, vpl, blocker, proxy } = &self.tables;
+        if let Some(vpls) = vpls {
+            let before = config.vpls.clone().unwrap_or_default();
+            write_settings(&mut document, &before, vpls, &defaults(!proxy.is_empty()));
+        }
+        write_list(&mut document, "vpl", &config.vpl, vpl);
+        write_list(&mut document, "blocker", &config.blocker, blocker);
+        let before: Vec<ProxyConfig> = config.proxy.iter().cloned().map(with_defaults).collect();
+        write_list(&mut document, "proxy", &before, proxy);
+        Ok(document.to_string())
+    }
+}
+
+/// A proxy with what [`VplTables`] say where a config says nothing.
+fn with_defaults(mut proxy: ProxyConfig) -> ProxyConfig {
+    proxy.position_m.get_or_insert_with(Vector::default);
+    proxy.rotation_deg.get_or_insert_with(Vector::default);
+    if let Some(cuboid) = &mut proxy.cuboid {
+        cuboid.centre_m.get_or_insert_with(Vector::default);
+    }
+    proxy
+}
+
+/// Settings that are neither what the text says nor, where it says nothing, the default.
+fn write_settings(document: &mut DocumentMut, before: &VplsConfig, now: &VplsConfig, default: &VplsConfig) {
+    let (before, now, default) = (table(before), table(now), table(default));
+    let is_same = |key: &str, value: &Item| {
+        let said = before.get(key).or_else(|| default.get(key));
+        said.is_some_and(|said| said.to_string() == value.to_string())
+    };
+    let changed: Vec<_> = now.iter().filter(|(key, value)| !is_same(key, value)).collect();
+    if changed.is_empty() {
+        return;
+    }
+    let settings = document.entry("vpls").or_insert_with(|| Item::Table(Table::new()));
+    if let Some(settings) = settings.as_table_like_mut() {
+        changed.into_iter().for_each(|(key, value)| put(settings, key, value));
+    }
+}
+
+/// What a config has that says nothing.
+fn defaults(has_proxies: bool) -> VplsConfig {
+    let surfaces = if has_proxies { PhantomSurfaces::Proxies } else { PhantomSurfaces::Scene };
+    let settings = crate::settings::VplSettings::default();
+    let widen = |x: f32| x.to_string().parse().ok();
+    VplsConfig {
+        area_per_weight_m2: widen(settings.area_per_weight),
+        cull_intensity_w_sr: widen(settings.cull_intensity),
+        weights: Some(settings.weights),
+        visibility: Some(settings.visibility),
+        phantom_surfaces: Some(surfaces),
+        softening_m2: widen(settings.softening),
+        smoothing_s: widen(settings.smoothing_s),
+        second_bounce_albedo: widen(settings.second_bounce_albedo),
+        second_bounce_distance_m: widen(settings.second_bounce_distance),
+        photons: Some(settings.photons),
+        ..VplsConfig::default()
+    }
+}
+
+/// Entries of an array of tables: those that are the same stay, of the others the first are changed, and what is too many or
+/// too few is taken away or added.
+fn write_list<T: Serialize + PartialEq>(document: &mut DocumentMut, name: &str, before: &[T], now: &[T]) {
+    if before == now {
+        return;
+    }
+    let list = document.entry(name).or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+    let Some(tables) = list.as_array_of_tables_mut() else {
+        // A list in one line is written anew.
+        let mut tables = ArrayOfTables::new();
+        now.iter().for_each(|entry| tables.push(table(entry)));
+        *list = Item::ArrayOfTables(tables);
+        return;
+    };
+    let (mut at, mut old, mut new) = (0, before, now);
+    while let Some((first, rest)) = old.split_first() {
+        match new.split_first() {
+            Some((wanted, left)) if wanted == first => (at, new) = (at + 1, left),
+            // More are there than are wanted.
+            _ if old.len() > new.len() => drop(tables.remove(at)),
+            Some((wanted, left)) => {
+                if let Some(entry) = tables.get_mut(at) {
+                    let (before, wanted) = (table(first), table(wanted));
+                    entry.retain(|key, _| wanted.contains_key(key));
+                    // What says the same stays as it is written.
+                    let is_other = |key: &str, value: &Item| {
+                        before.get(key).is_none_or(|before| before.to_string() != value.to_string())
+                    };
+                    let changed = wanted.iter().filter(|(key, value)| is_other(key, value));
+                    changed.for_each(|(key, value)| put(entry, key, value));
+                }
+                (at, new) = (at + 1, left);
+            }
+            None => break,
+        }
+        old = rest;
+    }
+    new.iter().for_each(|entry| tables.push(table(entry)));
+    if tables.is_empty() {
+        document.remove(name);
+    }
+}
+
+/// Puts a value in the place of another one, whose comments stay.
+fn put(table: &mut (impl toml_edit::TableLike + ?Sized), key: &str, item: &Item) {
+    match (table.get_mut(key).and_then(Item::as_value_mut), item.as_value()) {
+        (Some(there), Some(value)) => {
+            let decor = there.decor().clone();
+            *there = value.clone();
+            *there.decor_mut() = decor;
+        }
+        _ => {
+            table.insert(key, item.clone());
+        }
+    }
+}
+
+/// A config's table, tables within it in one line.
+fn table(entry: &impl Serialize) -> Table {
+    let written = toml_edit::ser::to_document(entry);
+    let written = written.expect("invariant: a config has only values that TOML can hold");
+    let mut table = written.into_table();
+    for (_, item) in table.iter_mut() {
+        if let Item::Table(inner) = item {
+            *item = Item::Value(Value::InlineTable(inner.clone().into_inline_table()));
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use serde_json::json;
+
+    const TEXT: &str = "# A room.\n\
+        camera = { position_m = [0, 1, 4], target_m = [0, 1, 0], vertical_fov_deg = 40 }\n\
+        material.m.albedo = 0.5\n\
+        object.b = { material = \"m\", sphere = { radius_m = 1 } }\n\
+        [vpls]\nsmoothing_s = 0.1 # slow\n\n\
+        # First.\n[[vpl]]\nposition_m = [1, 0, 0] # here\nnormal = [0, 1, 0]\nalbedo = 0.5\n\n\
+        # Second.\n[[vpl]]\nposition_m = [2, 0, 0]\nnormal = [0, 1, 0]\nalbedo = 0.5\nweight = 3\n\n\
+        # Third.\n[[vpl]]\nposition_m = [3, 0, 0]\nnormal = [0, 1, 0]\nalbedo = 0.5\n\n\
+        [[proxy]]\nbox = { size_m = [1, 1, 1] }\n";
+
+    fn edited(values: serde_json::Value) -> String {
+        let file = Path::new("scene.toml");
+        let scene = SceneConfig::from_text(TEXT, file).unwrap().build().unwrap();
+        let mut edit = scene.edit();
+        edit.set_vpls(values.as_object().unwrap()).unwrap();
+        let edited = edit.finish();
+        let text = edited.vpls.written_into(TEXT, file).unwrap();
+        let again = SceneConfig::from_text(&text, file).unwrap().build().unwrap();
+        assert_eq!(again.vpls, edited.vpls, "{text}");
+        text
+    }
+
+    fn vpl(x: f64) -> serde_json::Value {
+        json!({ "position_m": [x, 0, 0], "normal": [0, 1, 0], "albedo": 0.5 })
+    }
+
+    /// What has not changed leaves the text as it is, bit for bit.
+    #[test]
+    fn nothing_changes_where_nothing_has() {
+        let scene = SceneConfig::from_text(TEXT, Path::new("scene.toml")).unwrap().build().unwrap();
+        assert_eq!(scene.vpls.written_into(TEXT, Path::new("scene.toml")).unwrap(), TEXT);
+    }
+
+    #[test]
+    fn a_moved_vpl_keeps_its_comments() {
+        let mut second = vpl(2.0);
+        second["weight"] = json!(3);
+        let text = edited(json!({ "vpl": [vpl(1.5), second, vpl(3.0)] }));
+        assert_eq!(text, TEXT.replace("[1, 0, 0] # here", "[1.5, 0.0, 0.0] # here"));
+    }
+
+    #[test]
+    fn a_removed_vpl_goes_with_its_comment_and_a_new_one_comes_last() {
+        let text = edited(json!({ "vpl": [vpl(1.0), vpl(3.0)] }));
+        assert!(
+            text.contains("# First.") && !text.contains("# Second.") && text.contains("# Third."),
+            "{text}"
+        );
+        let mut second = vpl(2.0);
+        second["weight"] = json!(3);
+        let text = edited(json!({ "vpl": [vpl(1.0), second, vpl(3.0), vpl(4.0)] }));
+        assert!(text.starts_with(TEXT.split("[[proxy]]").next().unwrap()), "{text}");
+        assert_eq!(edited(json!({ "vpl": [] })).matches("[[vpl]]").count(), 0);
+    }
+
+    /// A key that is gone goes, settings change or come, and other lists are begun.
+    #[test]
+    fn keys_settings_and_lists_come_and_go() {
+        let text = edited(json!({
+            "vpl": [vpl(1.0), vpl(2.0), vpl(3.0)],
+            "vpls": { "smoothing_s": 0.2, "photons": 5 },
+            "blocker": [{ "position_m": [0, 1, 0], "radius_m": 0.25 }],
+            "proxy": [{ "position_m": [0, 0, 1], "rotation_deg": [0, 0, 0], "box": { "size_m": [2, 2, 2], "centre_m": [0, 0, 0] } }],
+        }));
+        assert!(!text.contains("weight") && text.contains("smoothing_s = 0.2 # slow"), "{text}");
+        assert!(text.contains("photons = 5") && text.contains("[[blocker]]"), "{text}");
+        assert!(!text.contains("softening_m2"), "defaults are not written: {text}");
+    }
+}
