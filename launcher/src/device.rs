@@ -4,7 +4,7 @@ use photonstream_evaluation::device::{Device, Drawn, Way};
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{LayerKind, RenderError, RenderOptions, Watch};
 use photonstream_renderer_wgpu::{Accumulation, AdapterChoice, Gpu, GpuError, Renderer, Show, View};
-use photonstream_scene::Scene;
+use photonstream_scene::{Scene, Visibility};
 use std::time::Instant;
 
 /// Frames that are timed at most, and at least.
@@ -67,6 +67,14 @@ impl GpuDevice {
             if run > 0 {
                 frames_ms.push(begun.elapsed().as_secs_f64() * 1e3);
             }
+        }
+        let without = self.renderer.unshadowed_vsls();
+        if view.visibility == Visibility::ShadowMaps && without > 0 {
+            return Err(RenderError::Option {
+                option: "visibility",
+                found: format!("shadow-maps, and {without} virtual surface lights too many"),
+                expected: "octahedral or rays for so many",
+            });
         }
         Ok(frames_ms)
     }
@@ -137,6 +145,7 @@ fn view(scene: &Scene, options: &RenderOptions, way: &Way) -> Result<View, Rende
         height: options.height,
         kernel: options.kernel,
         visibility: options.visibility,
+        shadow_map_px: options.shadow_map_px,
         epsilon: options.epsilon,
         light_samples: options.light_samples,
         seed: options.seed,

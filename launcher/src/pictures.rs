@@ -4,7 +4,9 @@ use crate::{error::LauncherError, progress::Share};
 use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{
-    FrameRenderer, LayerKind, RenderOptions, RenderStats, Watch, cli::Size, published::PublishedScene,
+    FrameRenderer, LayerKind, RenderOptions, RenderStats, Watch,
+    cli::{Size, shadow_map_px},
+    published::PublishedScene,
 };
 use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
 use photonstream_shading::Kernel;
@@ -24,9 +26,12 @@ pub(crate) struct Look {
     /// How a light's flux falls off: `patch` (near ones as polygons), `disc` (bounded) or `paper` (1/πr²) [default: as the scene says]
     #[arg(long)]
     pub(crate) kernel: Option<Kernel>,
-    /// Shadows of indirect light: `rays`, `octahedral` (distance maps that the simulator traces), `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
+    /// Shadows of indirect light: `rays`, `octahedral` (distance maps that the simulator traces), `shadow-maps` (drawn by wgpu for few lights; rays on the cpu), `none`, or `ao` (ambient occlusion, wgpu only) [default: as the scene says]
     #[arg(long)]
     pub(crate) visibility: Option<Visibility>,
+    /// Edge of each virtual surface light's shadow map in texels, for `shadow-maps`: 32, 64, 128 or 256 [default: as the scene says]
+    #[arg(long, value_name = "N", value_parser = shadow_map_px)]
+    pub(crate) shadow_map_px: Option<u32>,
     /// Smallest radiance worth adding, in W/(m² sr): where a light's range ends, 0 never [default: as the scene says]
     #[arg(long, value_name = "L")]
     pub(crate) epsilon: Option<f32>,
@@ -47,6 +52,7 @@ impl Look {
         add("size", self.size.map(|s| s.to_string()));
         add("kernel", self.kernel.map(|k| k.name().to_owned()));
         add("visibility", self.visibility.map(|v| v.name().to_owned()));
+        add("shadow-map-px", self.shadow_map_px.map(|n| n.to_string()));
         add("epsilon", self.epsilon.map(|e| e.to_string()));
         add("culling", self.culling.map(|c| c.name().to_owned()));
         arguments
@@ -68,6 +74,7 @@ impl Look {
         }
         options.kernel = self.kernel.unwrap_or(options.kernel);
         options.visibility = self.visibility.unwrap_or(options.visibility);
+        options.shadow_map_px = self.shadow_map_px.unwrap_or(options.shadow_map_px);
         options.epsilon = self.epsilon.unwrap_or(options.epsilon);
         options.culling = self.culling.unwrap_or(options.culling);
         options.layers = layers.to_vec();
@@ -123,7 +130,8 @@ impl Job<'_> {
             Ok((paths, film, rendered.stats))
         };
         let mut first_picture_s = None;
-        if let (true, Visibility::Rays, Some(out)) = (self.preview, options.visibility, self.outs.last()) {
+        let by_rays = matches!(options.visibility, Visibility::Rays | Visibility::ShadowMaps);
+        if let (true, true, Some(out)) = (self.preview, by_rays, self.outs.last()) {
             let quick = RenderOptions { visibility: Visibility::None, ..options.clone() };
             make(&quick, std::slice::from_ref(out))?;
             let seconds = self.begun.elapsed().as_secs_f64();

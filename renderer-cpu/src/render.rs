@@ -53,7 +53,7 @@ pub fn render_with(
     let start = Instant::now();
     options.validate()?;
     if options.visibility == Visibility::Ao {
-        let expected = "none, rays or octahedral here; ao needs the G-buffer of --renderer wgpu";
+        let expected = "none, rays, octahedral or shadow-maps here; ao needs the G-buffer of --renderer wgpu";
         return Err(RenderError::Option { option: "visibility", found: "ao".into(), expected });
     }
     let needs_maps = options.visibility == Visibility::Octahedral && options.needs(LayerKind::needs_indirect);
@@ -245,7 +245,8 @@ impl<'a> Frame<'a> {
             Visibility::Octahedral => {
                 result.skipped += mapped::accumulate(self.instructions, self.vsls, selection, tile)
             }
-            Visibility::Rays => {
+            // What shadow maps stand for.
+            Visibility::Rays | Visibility::ShadowMaps => {
                 let shadowed = shadowed::accumulate(self.scene, &self.culling, selection, tile);
                 result.skipped += shadowed.skipped;
                 result.stats.vsl_rays += shadowed.rays;

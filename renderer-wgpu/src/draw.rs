@@ -5,7 +5,7 @@ use crate::{
     Gpu, GpuError, PassTime, Renderer, Shadows, Show, View,
     deferred::{DirectKind, Shown as ShownInputs},
     frame::{can_see, frame_uniform},
-    gather::Gathering,
+    gather::{Gathering, Maps},
     openness::Openness,
     rays::{RayInputs, Rays, Traced},
     renderer::OnDevice,
@@ -14,6 +14,7 @@ use crate::{
     stages::Stage,
     targets::Targets,
     textures::Textures,
+    vsl_shadow_maps::Surroundings,
 };
 use glam::Vec3;
 use photonstream_renderer::Watch;
@@ -33,6 +34,8 @@ pub struct Drawn {
     pub light_rays: u64,
     /// Shadow rays to virtual surface lights.
     pub vsl_rays: u64,
+    /// Shadow maps of virtual surface lights that were drawn.
+    pub vsl_maps: u32,
     /// Whether the caller stopped it: the picture is not complete.
     pub stopped: bool,
 }
@@ -189,13 +192,24 @@ impl Renderer {
             } else if !by_rays {
                 let (accumulation, interleave) = (view.accumulation, view.interleave);
                 let listed = ranged || view.show == Show::Tiles;
+                let maps = match view.visibility {
+                    Visibility::Octahedral if self.vsls.maps.edge > 0 => Maps::Published,
+                    Visibility::ShadowMaps if view.draws_maps() => Maps::Drawn,
+                    _ => Maps::None,
+                };
+                if maps == Maps::Drawn {
+                    let surroundings = Surroundings::new(versions.shape, scene.bounds, scene.magnitude);
+                    let solids = (&scene.geometry, holes);
+                    drawn.vsl_maps =
+                        self.vsls.draw_shadow_maps(&mut scope, view.shadow_map_px, surroundings, solids)?;
+                }
                 let gathering = Gathering {
                     accumulation,
                     ranged,
                     interleave,
                     listed,
                     patches: view.kernel == Kernel::Patch,
-                    mapped: view.visibility == Visibility::Octahedral && self.vsls.maps.edge > 0,
+                    maps,
                 };
                 self.gather.encode(&mut scope, targets, &scene.geometry, &self.vsls, gathering, sees)?;
             }

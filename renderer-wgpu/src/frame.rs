@@ -5,13 +5,14 @@ use crate::{
     layout::{ALL_LIGHTS, CameraUniform, FrameUniform, Shown},
     openness,
     renderer::OnDevice,
+    vsl_shadow_maps,
 };
 use glam::Vec3;
 use photonstream_renderer::LayerKind;
 use photonstream_shading::{Camera, Kernel, culling};
 
 /// The numbers of `view`.
-pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32, map_edge: u32) -> FrameUniform {
+pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32, published_edge: u32) -> FrameUniform {
     let Camera { position, forward, right, up, tan_half_fov } = view.camera;
     let show = match view.show {
         Show::Layer(LayerKind::Full) | Show::Discs => Shown::Full,
@@ -58,7 +59,8 @@ pub(crate) fn frame_uniform(view: &View, scene: &OnDevice, vsls: u32, map_edge: 
         ao_samples: openness::SAMPLES,
         flux_of_range: if by_lot { culling::flux_of_range(scene.albedo_max, view.epsilon) } else { 0.0 },
         first_lot: if by_lot { culling::first_lot(view.seed, view.sample) } else { 0 },
-        map_edge,
+        map_edge: if view.draws_maps() { view.shadow_map_px } else { published_edge },
+        map_depth_scale: 1.0 / vsl_shadow_maps::near(scene.bounds),
         ..FrameUniform::default()
     }
 }

@@ -2,6 +2,7 @@
 
 mod variant;
 
+pub(crate) use self::variant::Maps;
 use self::variant::{Variant, pipeline};
 use crate::{
     Accumulation, Gpu, GpuError,
@@ -30,8 +31,8 @@ pub(crate) struct Gathering {
     pub(crate) listed: bool,
     /// Whether near lights are polygons.
     pub(crate) patches: bool,
-    /// Whether lights are shadowed by their distance maps.
-    pub(crate) mapped: bool,
+    /// What lights are shadowed by.
+    pub(crate) maps: Maps,
 }
 
 /// The passes that sum virtual surface lights.
@@ -153,7 +154,7 @@ impl Gather {
     }
 
     fn prepare(&mut self, gpu: &Gpu, gathering: Gathering) -> Result<(), GpuError> {
-        let Gathering { accumulation, ranged, interleave, patches, mapped, .. } = gathering;
+        let Gathering { accumulation, ranged, interleave, patches, maps, .. } = gathering;
         if accumulation != Accumulation::Tiled
             && !gpu.device.features().contains(wgpu::Features::FLOAT32_BLENDABLE)
         {
@@ -166,7 +167,7 @@ impl Gather {
         }
         for continues in [false, true] {
             let variant =
-                Variant { accumulation, ranged, continues, interleaved: interleave > 1, patches, mapped };
+                Variant { accumulation, ranged, continues, interleaved: interleave > 1, patches, maps };
             self.pipelines.entry(variant).or_insert_with(|| pipeline(gpu, variant));
         }
         if interleave > 1 && self.join.is_none() {
@@ -244,7 +245,7 @@ impl Gather {
                 continues: !first,
                 interleaved,
                 patches: gathering.patches,
-                mapped: gathering.mapped,
+                maps: gathering.maps,
             };
             let pipeline = &self.pipelines[&variant];
             let (to, from) = turn(targets, writes - 1 - batch);
@@ -264,8 +265,8 @@ impl Gather {
                 None,
                 lights.numbers(batch),
                 whole(&lights.patches),
-                whole(&lights.maps.texels),
             ];
+            resources.extend(map_resources(lights, gathering.maps, resources.len()));
             let edge = Edge { span: shading, first, last };
             match near.filter(|_| interleaved) {
                 Some([near_to, near_from]) => {
@@ -298,34 +299,21 @@ impl Gather {
         gathering: Gathering,
         sees: impl Fn(Vec3, f32) -> bool,
     ) {
-        let Gathering { accumulation, ranged, patches, mapped, .. } = gathering;
+        let Gathering { accumulation, ranged, patches, maps, .. } = gathering;
         let pipeline = &self.pipelines
-            [&Variant { accumulation, ranged, continues: false, interleaved: false, patches, mapped }];
+            [&Variant { accumulation, ranged, continues: false, interleaved: false, patches, maps }];
         let forward = accumulation == Accumulation::Forward;
         let batches = lights.batches();
         let span = scope.timer.span("indirect light");
         for batch in 0..batches {
             let (offset, bytes) = lights.batch(batch);
             let block = part(&lights.lights, offset, bytes);
-            let resources = if forward {
-                vec![
-                    whole(scope.frame),
-                    block,
-                    lights.numbers(batch),
-                    whole(&lights.patches),
-                    whole(&lights.maps.texels),
-                ]
-            } else {
-                let gbuffer = texture(&targets.gbuffer.view);
-                vec![
-                    whole(scope.frame),
-                    gbuffer,
-                    block,
-                    lights.numbers(batch),
-                    whole(&lights.patches),
-                    whole(&lights.maps.texels),
-                ]
-            };
+            let mut resources = vec![whole(scope.frame)];
+            if !forward {
+                resources.push(texture(&targets.gbuffer.view));
+            }
+            resources.extend([block, lights.numbers(batch), whole(&lights.patches)]);
+            resources.extend(map_resources(lights, maps, resources.len()));
             let group = pipelines::bind(scope.gpu, &pipeline.get_bind_group_layout(0), &resources);
             let load = if batch == 0 { LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { LoadOp::Load };
             let depth = forward.then_some((&targets.depth.view, LoadOp::Load));
@@ -343,6 +331,22 @@ impl Gather {
         }
     }
 }
+
+/// What a pipeline looks lights' shadows up in, from binding `next` on: published distance maps, or, at bindings of their own
+/// in every module, the maps that are drawn.
+fn map_resources(lights: &VslBuffer, maps: Maps, next: usize) -> Vec<Option<wgpu::BindingResource<'_>>> {
+    if maps != Maps::Drawn {
+        return vec![whole(&lights.maps.texels)];
+    }
+    let mut resources = vec![None; DRAWN_MAPS_BINDING - next];
+    let drawn = &lights.shadow_maps;
+    let sampler = Some(wgpu::BindingResource::Sampler(&drawn.nearest));
+    resources.extend([texture(&drawn.maps), whole(&drawn.layers), sampler]);
+    resources
+}
+
+/// The first binding of vsl_map_drawn.wgsl.
+const DRAWN_MAPS_BINDING: usize = 9;
 
 const TALLIES: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_SRC);
 

@@ -37,7 +37,7 @@ pub(crate) const COVERED_TEXELS: f32 = 1.0;
 pub(crate) const BEAM_BIAS_TEXELS: f32 = 0.25;
 pub(crate) const BEAM_SLOPE_TOLERANCE: f32 = 0.25;
 
-/// Stands for the layer of a view whose map does not name triangles.
+/// Stands for the layer of a view whose map does not name triangles, and of a virtual surface light without a shadow map.
 pub(crate) const NO_LAYER: u32 = u32::MAX;
 
 const _: () = assert!(BATCH_LIGHTS as usize * size_of::<VslUniform>() <= crate::UNIFORM_BLOCK_BYTES as usize);
@@ -81,6 +81,7 @@ pub(crate) fn constants() -> String {
     unsigned("ALL_LIGHTS", ALL_LIGHTS);
     unsigned("NO_OWNER", NO_OWNER);
     unsigned("NO_BEND", NO_BEND);
+    unsigned("NO_LAYER", NO_LAYER);
     for (name, shown) in Shown::NAMES {
         unsigned(&format!("SHOW_{name}"), shown as u32);
     }
@@ -155,9 +156,9 @@ shared! {
         flux_of_range: f32,
         first_lot: u32,
         map_edge: u32,
+        map_depth_scale: f32,
         pad_0: u32,
         pad_1: u32,
-        pad_2: u32,
     }
 
     /// Twin of `Object` in frame.wgsl.
@@ -278,6 +279,18 @@ shared! {
         parallel: u32,
         layer: u32,
         pad_1: u32,
+    }
+
+    /// Twin of `VslView` in vsl_quarter.wgsl.
+    VslView as "VslView" {
+        position: [f32; 3],
+        near: f32,
+        tangent: [f32; 3],
+        pad_0: u32,
+        bitangent: [f32; 3],
+        pad_1: u32,
+        normal: [f32; 3],
+        edge: f32,
     }
 }
 

@@ -33,6 +33,7 @@ mod textures;
 mod timer;
 mod view;
 mod vsl_buffer;
+mod vsl_shadow_maps;
 
 pub use draw::Drawn;
 pub use error::GpuError;

@@ -75,6 +75,7 @@ impl Default for Choices {
 #[derive(Debug, Default)]
 struct Warned {
     unshadowed: bool,
+    unshadowed_vsls: bool,
     refused: bool,
 }
 
@@ -106,6 +107,7 @@ impl WgpuRenderer {
             height: options.height,
             kernel: options.kernel,
             visibility: options.visibility,
+            shadow_map_px: options.shadow_map_px,
             epsilon: options.epsilon,
             culling: options.culling,
             light_samples: options.light_samples,
@@ -118,11 +120,19 @@ impl WgpuRenderer {
         }
     }
 
-    fn warn(&mut self) -> Result<(), GpuError> {
+    fn warn(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let unshadowed = self.renderer.unshadowed_lights();
         if unshadowed > 0 && !std::mem::replace(&mut self.warned.unshadowed, true) {
             tracing::warn!(
                 "{unshadowed} lights have no shadows: there are only 256 shadow maps; use --shadows rays"
+            );
+        }
+        let unshadowed =
+            if options.visibility == Visibility::ShadowMaps { self.renderer.unshadowed_vsls() } else { 0 };
+        if unshadowed > 0 && !std::mem::replace(&mut self.warned.unshadowed_vsls, true) {
+            tracing::warn!(
+                "{unshadowed} virtual surface lights, the darkest, have no shadows: there are too many for shadow maps; use \
+                 --visibility octahedral or rays"
             );
         }
         let refused = self.renderer.refused_records()?;
@@ -208,7 +218,7 @@ impl FrameRenderer for WgpuRenderer {
             RangeCulling::Cut if range_sum > 0.0 => stats.range_loss_share = range_sum / indirect_sum,
             RangeCulling::Cut => {}
         }
-        self.warn()?;
+        self.warn(options)?;
         let by_rays = options.needs(LayerKind::needs_indirect) && options.visibility == Visibility::Rays;
         stats.noise = if by_rays { self.renderer.noise()? } else { None };
         if let Some(noise) = stats.noise.filter(|&noise| noise > 0.0) {

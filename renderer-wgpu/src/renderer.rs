@@ -114,6 +114,14 @@ impl Renderer {
         self.maps.unshadowed()
     }
 
+    /// Number of virtual surface lights that shone in the last picture with [`Visibility::ShadowMaps`] and had no shadow
+    /// map, because there are 1 024, or as many as the device has layers.
+    ///
+    /// [`Visibility::ShadowMaps`]: photonstream_scene::Visibility::ShadowMaps
+    pub fn unshadowed_vsls(&self) -> u32 {
+        self.vsls.shadow_maps.without()
+    }
+
     /// Takes over `scene`: uploads what differs from the last one.
     ///
     /// # Errors

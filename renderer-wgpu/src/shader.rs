@@ -16,6 +16,9 @@ const CORNER: &str = include_str!("../wgsl/corner.wgsl");
 const VSL: &str = include_str!("../wgsl/vsl.wgsl");
 const VSL_PATCH: &str = include_str!("../wgsl/vsl_patch.wgsl");
 const VSL_MAP: &str = include_str!("../wgsl/vsl_map.wgsl");
+const VSL_MAP_PUBLISHED: &str = include_str!("../wgsl/vsl_map_published.wgsl");
+const VSL_MAP_DRAWN: &str = include_str!("../wgsl/vsl_map_drawn.wgsl");
+const VSL_QUARTER: &str = include_str!("../wgsl/vsl_quarter.wgsl");
 const SHADOW: &str = include_str!("../wgsl/shadow.wgsl");
 
 const SHADOW_BEAM: &str = include_str!("../wgsl/shadow_beam.wgsl");
@@ -50,14 +53,25 @@ sources! {
     DIRECT = "direct" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, wgsl::LIGHT, FRAME, SHADOW, SHADOW_BEAM, SHADOW_NAMED];
     UNPACK = "unpack" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
     CULL = "cull" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::CULLING, FRAME, VSL];
+    VSL_SHADOW_MAP = "vsl_shadow_map" [VSL_QUARTER];
+    VSL_SHADOW_MAP_HOLES = "vsl_shadow_map_holes" [wgsl::WRAP, wgsl::TEXTURE, VSL_QUARTER];
     TILED = "tiled" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, VSL, VSL_PATCH, VSL_MAP
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, wgsl::DISTANCE_TEXELS, FRAME, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_PUBLISHED
+    ];
+    TILED_DRAWN = "tiled" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_DRAWN
     ];
     SPLAT = "splat" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, wgsl::DISTANCE_TEXELS, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_PUBLISHED
+    ];
+    SPLAT_DRAWN = "splat" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_DRAWN
     ];
     FORWARD = "forward" [
-        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, CORNER, VSL, VSL_PATCH, VSL_MAP
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, wgsl::DISTANCE_TEXELS, FRAME, PROJECTION, CORNER, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_PUBLISHED
+    ];
+    FORWARD_DRAWN = "forward" [
+        wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SURFACE, wgsl::KERNEL, wgsl::PATCH, wgsl::CULLING, wgsl::BASIS, wgsl::DISTANCE_MAP, FRAME, PROJECTION, CORNER, VSL, VSL_PATCH, VSL_MAP, VSL_MAP_DRAWN
     ];
     INTERLEAVE = "interleave" [wgsl::CAMERA, wgsl::OCTAHEDRAL, FRAME];
     AO = "ao" [wgsl::CAMERA, wgsl::OCTAHEDRAL, wgsl::SOBOL, FRAME, PROJECTION];

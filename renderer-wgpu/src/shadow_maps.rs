@@ -218,7 +218,13 @@ fn depths_drawing() -> Drawing<'static> {
 /// Names of triangles: their numbers plus one, 0 for none.
 const NAMES: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-fn maps_texture(gpu: &Gpu, format: wgpu::TextureFormat, resolution: u32, count: u32) -> wgpu::Texture {
+/// A texture of `count` layers of `resolution`² texels to draw to.
+pub(crate) fn maps_texture(
+    gpu: &Gpu,
+    format: wgpu::TextureFormat,
+    resolution: u32,
+    count: u32,
+) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("shadow maps"),
         size: wgpu::Extent3d { width: resolution, height: resolution, depth_or_array_layers: count },
@@ -226,12 +232,15 @@ fn maps_texture(gpu: &Gpu, format: wgpu::TextureFormat, resolution: u32, count: 
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
+        usage: TextureUsages::RENDER_ATTACHMENT
+            | TextureUsages::TEXTURE_BINDING
+            | if cfg!(test) { TextureUsages::COPY_SRC } else { TextureUsages::empty() },
         view_formats: &[],
     })
 }
 
-fn one_layer(texture: &wgpu::Texture, layer: u32) -> wgpu::TextureView {
+/// One layer, to draw to.
+pub(crate) fn one_layer(texture: &wgpu::Texture, layer: u32) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2),
         base_array_layer: layer,
@@ -240,7 +249,8 @@ fn one_layer(texture: &wgpu::Texture, layer: u32) -> wgpu::TextureView {
     })
 }
 
-fn layers(texture: &wgpu::Texture) -> wgpu::TextureView {
+/// All layers, for shaders.
+pub(crate) fn layers(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..Default::default()

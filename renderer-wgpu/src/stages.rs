@@ -72,6 +72,7 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
         },
         kernel: Kernel::Paper,
         visibility: Visibility::None,
+        shadow_map_px: 0,
         epsilon: 0.0,
         culling: RangeCulling::Cut,
         accumulation: Accumulation::Tiled,
@@ -117,9 +118,11 @@ fn key(stage: Stage, view: &View, versions: Versions) -> Key {
                 interleave: view.interleave,
                 visibility: match view.visibility {
                     Visibility::Octahedral => Visibility::Octahedral,
+                    Visibility::ShadowMaps if view.draws_maps() => Visibility::ShadowMaps,
                     _ if rays => Visibility::Rays,
                     _ => Visibility::None,
                 },
+                shadow_map_px: if view.draws_maps() { view.shadow_map_px } else { 0 },
                 // Lists that the sum itself does not need are made for it alone.
                 show: if view.show == Show::Tiles { Show::Tiles } else { base.show },
                 rays_per_pixel: if rays { view.rays_per_pixel } else { 0 },
@@ -174,6 +177,9 @@ mod tests {
         let culling = RangeCulling::Cut;
         assert_eq!(stale(View { culling, ..view }, versions), [Unpack, Indirect, Output]);
         assert_eq!(stale(View { interleave: 2, ..view }, versions), [Indirect, Output]);
+        assert_eq!(stale(View { shadow_map_px: 32, ..view }, versions), [Output]);
+        let visibility = Visibility::ShadowMaps;
+        assert_eq!(stale(View { visibility, ..view }, versions), [Indirect, Output]);
         assert_eq!(stale(View { show: Show::Tiles, ..view }, versions), [Indirect, Owners, Output]);
         assert_eq!(stale(view, Versions { vsls: 1, ..versions }), [Unpack, Indirect, Owners, Output]);
         assert_eq!(stale(view, Versions { lights: 1, ..versions }), [Direct, Output]);

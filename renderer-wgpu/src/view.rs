@@ -2,7 +2,7 @@
 
 use crate::GpuError;
 use photonstream_renderer::LayerKind;
-use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, SHADOW_MAP_EDGES, Visibility};
 use photonstream_shading::{Camera, Kernel};
 
 macro_rules! named {
@@ -93,6 +93,8 @@ pub struct View {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed, and how.
     pub visibility: Visibility,
+    /// Edge of the shadow maps of virtual surface lights in texels, for [`Visibility::ShadowMaps`]: 32, 64, 128 or 256.
+    pub shadow_map_px: u32,
     /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
     /// Whether lights beyond their range are skipped or drawn by lot.
@@ -129,6 +131,7 @@ impl View {
             camera: *camera,
             kernel: settings.kernel,
             visibility: settings.visibility,
+            shadow_map_px: settings.shadow_map_px,
             epsilon: settings.epsilon,
             culling: settings.culling,
             accumulation: Accumulation::default(),
@@ -152,6 +155,9 @@ impl View {
         if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
             return wrong("epsilon", self.epsilon.to_string(), "0 or more, finite");
         }
+        if !SHADOW_MAP_EDGES.contains(&self.shadow_map_px) {
+            return wrong("shadow_map_px", self.shadow_map_px.to_string(), "32, 64, 128 or 256");
+        }
         if !matches!(self.interleave, 1 | 2 | 4) {
             return wrong("interleave", self.interleave.to_string(), "1, 2 or 4");
         }
@@ -168,6 +174,11 @@ impl View {
     /// Whether indirect light is summed by shadow rays; lists of tiles are shown without.
     pub(crate) fn by_rays(&self) -> bool {
         self.visibility == Visibility::Rays && self.show != Show::Tiles
+    }
+
+    /// Whether virtual surface lights are shadowed by maps that are drawn; lists of tiles are shown without.
+    pub(crate) fn draws_maps(&self) -> bool {
+        self.visibility == Visibility::ShadowMaps && self.show != Show::Tiles
     }
 
     /// Whether lights draw their range by lot.

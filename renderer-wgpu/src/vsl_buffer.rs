@@ -2,13 +2,15 @@
 
 use crate::{
     Gpu, GpuError,
-    geometry::buffer,
+    geometry::{Geometry, buffer},
     layout::{BATCH_LIGHTS, BatchNumbers, VslUniform},
     map_buffer::MapBuffer,
     pipelines::{self, groups_of_64, whole},
     readback,
     scope::Scope,
     shader,
+    textures::Textures,
+    vsl_shadow_maps::{Surroundings, VslShadowMaps},
 };
 use photonstream_protocol::{DistanceRecord, PatchRecord, VslFrame, VslRecord};
 use std::ops::Range;
@@ -45,6 +47,8 @@ pub(crate) struct VslBuffer {
     pub(crate) lacks_patches: bool,
     /// What the lights see around themselves.
     pub(crate) maps: MapBuffer,
+    /// The same, as it is drawn here.
+    pub(crate) shadow_maps: VslShadowMaps,
     /// [`BatchNumbers`] of each batch, [`NUMBERS_STRIDE`] apart.
     numbers: wgpu::Buffer,
     /// Where changed records lie before the device puts each in its place.
@@ -80,6 +84,7 @@ impl VslBuffer {
             patch_records: Vec::new(),
             lacks_patches: false,
             maps: MapBuffer::new(gpu),
+            shadow_maps: VslShadowMaps::new(gpu),
             numbers: buffer(gpu, "batches", NUMBERS_STRIDE, BufferUsages::UNIFORM),
             staging: None,
             pending: Vec::new(),
@@ -238,6 +243,24 @@ impl VslBuffer {
     /// loses nothing.
     pub(crate) fn delivered(&mut self) {
         self.pending.clear();
+        self.shadow_maps.delivered();
+    }
+
+    /// Draws the shadow maps of `edge`² texels that are due; how many.
+    ///
+    /// # Errors
+    /// A failed device.
+    pub(crate) fn draw_shadow_maps(
+        &mut self,
+        scope: &mut Scope<'_>,
+        edge: u32,
+        surroundings: Surroundings,
+        solids: (&Geometry, Option<&Textures>),
+    ) -> Result<u32, GpuError> {
+        self.mirror(scope.gpu)?;
+        let records = self.mirror.as_deref().unwrap_or_default();
+        self.shadow_maps.update(scope.gpu, records, edge, surroundings);
+        Ok(self.shadow_maps.encode(scope, solids))
     }
 
     fn flush_now(&mut self, gpu: &Gpu) {

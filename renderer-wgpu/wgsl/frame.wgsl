@@ -23,10 +23,10 @@ struct Frame {
     ao_samples: u32,
     flux_of_range: f32,      // flux that has a range of 1 m, in W; 0 where no light draws its range by lot
     first_lot: u32,          // where the lots of the lights begin
-    map_edge: u32,           // texels; 0: no distance maps
+    map_edge: u32,           // texels; 0: no maps of virtual surface lights
+    map_depth_scale: f32,    // depth in shadow maps of virtual surface lights to inverse distance, m⁻¹
     pad_0: u32,
     pad_1: u32,
-    pad_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -2,7 +2,7 @@
 
 use crate::{LayerKind, RenderOptions};
 use photonstream_protocol::ChannelName;
-use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, SHADOW_MAP_EDGES, Visibility};
 use photonstream_shading::Kernel;
 use std::{path::PathBuf, str::FromStr};
 
@@ -30,9 +30,14 @@ pub struct Args {
     /// How light falls off: paper, disc or patch; the scene's own if not given.
     #[arg(long, value_name = "K")]
     pub kernel: Option<Kernel>,
-    /// Shadows of indirect light: none, rays, or ao with the GPU renderer; the scene's own if not given.
+    /// Shadows of indirect light: none, rays, octahedral, shadow-maps (rays without the GPU renderer), or ao with the GPU renderer;
+    /// the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
+    /// Edge of each virtual surface light's shadow map for visibility shadow-maps: 32, 64, 128 or 256 texels; the scene's own if not
+    /// given.
+    #[arg(long, value_name = "N", value_parser = shadow_map_px)]
+    pub shadow_map_px: Option<u32>,
     /// Smallest radiance worth adding, W/(m² sr), which ends the range of a light; 0: no range; the scene's own if not given.
     #[arg(long, value_name = "L")]
     pub epsilon: Option<f32>,
@@ -48,6 +53,15 @@ pub struct Args {
     /// Render threads; one per core if not given.
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
+}
+
+/// The edge of a shadow map from its text on the command line.
+///
+/// # Errors
+/// What is expected, for any other than one of [`SHADOW_MAP_EDGES`].
+pub fn shadow_map_px(text: &str) -> Result<u32, String> {
+    let edge = text.parse().ok().filter(|edge| SHADOW_MAP_EDGES.contains(edge));
+    edge.ok_or_else(|| format!("found \"{text}\", expected 32, 64, 128 or 256"))
 }
 
 /// A picture size, written as 800x600.
@@ -85,6 +99,7 @@ impl Args {
             height: self.size.map_or(defaults.height, |s| s.height),
             kernel: self.kernel.unwrap_or(defaults.kernel),
             visibility: self.visibility.unwrap_or(defaults.visibility),
+            shadow_map_px: self.shadow_map_px.unwrap_or(defaults.shadow_map_px),
             epsilon: self.epsilon.unwrap_or(defaults.epsilon),
             culling: self.culling.unwrap_or(defaults.culling),
             layers: self.show.clone(),
@@ -112,12 +127,13 @@ mod tests {
         let args = Command::try_parse_from(["r"]).unwrap().args;
         assert_eq!(args.options(&settings), RenderOptions::from_settings(&settings));
         let line = "r --channel a-1 --out x --headless --frames 3 --size 64x48 --kernel paper --visibility none \
-                    --epsilon 0.5 --culling cut --show full,normal --samples 4 --threads 2 --first 12";
+                    --epsilon 0.5 --culling cut --show full,normal --samples 4 --threads 2 --first 12 --shadow-map-px 64";
         let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
         let options = args.options(&settings);
         assert_eq!((options.width, options.height, options.samples_per_pixel), (64, 48, 4));
         assert_eq!((options.kernel, options.visibility), (Kernel::Paper, Visibility::None));
         assert_eq!((options.epsilon, options.culling), (0.5, RangeCulling::Cut));
+        assert_eq!((settings.shadow_map_px, options.shadow_map_px), (128, 64));
         assert_eq!(options.layers, [LayerKind::Full, LayerKind::Normal]);
         assert_eq!((args.frames, args.first, options.threads), (Some(3), 12, Some(2)));
     }
@@ -130,6 +146,7 @@ mod tests {
             ("r --kernel box", "paper, disc, patch"),
             ("r --culling some", "cut, stochastic"),
             ("r --show ful", "full, direct, indirect"),
+            ("r --shadow-map-px 48", "32, 64, 128 or 256"),
             ("r --frames 0", "0 is not in 1.."),
             ("r --first 0", "0 is not in 1.."),
         ] {

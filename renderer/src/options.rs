@@ -2,7 +2,7 @@
 
 use crate::{LayerKind, RenderError, distance_map_edge};
 use photonstream_protocol::VslFrame;
-use photonstream_scene::{RangeCulling, RenderSettings, Visibility};
+use photonstream_scene::{RangeCulling, RenderSettings, SHADOW_MAP_EDGES, Visibility};
 use photonstream_shading::Kernel;
 
 /// What a picture of virtual surface lights shall be like.
@@ -16,6 +16,8 @@ pub struct RenderOptions {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed.
     pub visibility: Visibility,
+    /// Edge of the shadow maps of virtual surface lights in texels, for [`Visibility::ShadowMaps`].
+    pub shadow_map_px: u32,
     /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
     /// Whether lights beyond their range are skipped or drawn by lot.
@@ -40,6 +42,7 @@ impl RenderOptions {
             height: settings.height,
             kernel: settings.kernel,
             visibility: settings.visibility,
+            shadow_map_px: settings.shadow_map_px,
             epsilon: settings.epsilon,
             culling: settings.culling,
             light_samples: settings.light_samples,
@@ -58,6 +61,9 @@ impl RenderOptions {
         let wrong = |option, found: String, expected| Err(RenderError::Option { option, found, expected });
         if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
             return wrong("epsilon", self.epsilon.to_string(), "0 or more, finite");
+        }
+        if !SHADOW_MAP_EDGES.contains(&self.shadow_map_px) {
+            return wrong("shadow_map_px", self.shadow_map_px.to_string(), "32, 64, 128 or 256");
         }
         if !(1..=MAX_SAMPLES).contains(&self.light_samples) {
             return wrong("light_samples", self.light_samples.to_string(), "1 to 65536");

@@ -34,8 +34,8 @@ pub use model::{ModelOptions, ModelScene, is_model};
 pub use picture::{Picture, Texture};
 pub use scene::{Geometry, LightId, Material, MaterialId, Object, ObjectId, Scene, SceneLight, Side, Sides};
 pub use settings::{
-    Method, PhantomSurfaces, RangeCulling, RenderSettings, Sampling, StreamingSettings, Visibility,
-    VplSettings, VplVisibility, Weights,
+    Method, PhantomSurfaces, RangeCulling, RenderSettings, SHADOW_MAP_EDGES, Sampling, StreamingSettings,
+    Visibility, VplSettings, VplVisibility, Weights,
 };
 pub use texturing::Detail;
 pub use vpls::VplSet;

@@ -121,6 +121,9 @@ pub enum Visibility {
     /// The octahedral distance maps of the virtual surface lights, which the simulator traces and publishes: shadows without
     /// a ray in the renderer ([`photonstream_shading::distance_map`]).
     Octahedral,
+    /// One small shadow map for each virtual surface light that shines, drawn by the renderer when the light has moved: for
+    /// methods with few lights. Renderers without a rasteriser send the rays of [`Visibility::Rays`], which the maps stand for.
+    ShadowMaps,
 }
 
 /// What becomes of a virtual surface light beyond its range, where it cannot add `epsilon` to any radiance.
@@ -211,6 +214,9 @@ impl Default for StreamingSettings {
     }
 }
 
+/// Edges that shadow maps of virtual surface lights may have, in texels.
+pub const SHADOW_MAP_EDGES: [u32; 4] = [32, 64, 128, 256];
+
 /// Default settings of the renderers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
@@ -222,6 +228,8 @@ pub struct RenderSettings {
     pub kernel: Kernel,
     /// Whether virtual surface lights are shadowed.
     pub visibility: Visibility,
+    /// Edge of the shadow maps of virtual surface lights in texels, for visibility `shadow-maps`; one of [`SHADOW_MAP_EDGES`].
+    pub shadow_map_px: u32,
     /// A virtual surface light ends at the range where it cannot add this radiance (W m⁻² sr⁻¹) any more; 0: it has none.
     pub epsilon: f32,
     /// Whether lights beyond their range are skipped or drawn by lot.
@@ -241,6 +249,7 @@ impl Default for RenderSettings {
             height: 600,
             kernel: Kernel::Patch,
             visibility: Visibility::Rays,
+            shadow_map_px: 128,
             epsilon: 1e-6,
             culling: RangeCulling::default(),
             light_samples: 16,
@@ -304,4 +313,12 @@ named!(VplVisibility, "visibility", Blockers = "blockers", Rays = "rays", None =
 named!(PhantomSurfaces, "phantom_surfaces", Scene = "scene", Proxies = "proxies");
 named!(Sampling, "sampling", Replay = "replay", Fresh = "fresh");
 named!(RangeCulling, "culling", Cut = "cut", Stochastic = "stochastic");
-named!(Visibility, "visibility", None = "none", Ao = "ao", Rays = "rays", Octahedral = "octahedral");
+named!(
+    Visibility,
+    "visibility",
+    None = "none",
+    Ao = "ao",
+    Rays = "rays",
+    Octahedral = "octahedral",
+    ShadowMaps = "shadow-maps"
+);

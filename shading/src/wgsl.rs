@@ -11,8 +11,10 @@ use std::fmt::Write;
 pub const KERNEL: &str = include_str!("../wgsl/kernel.wgsl");
 /// Twin of [`crate::basis`].
 pub const BASIS: &str = include_str!("../wgsl/basis.wgsl");
-/// Twin of [`crate::distance_map`]; the module that includes it has `distance_maps: array<u32>`.
+/// Twin of [`crate::distance_map`]; the module that includes it has `distance_map_inverse`, as [`DISTANCE_TEXELS`] do.
 pub const DISTANCE_MAP: &str = include_str!("../wgsl/distance_map.wgsl");
+/// What texels of published distance maps hold; the module that includes it has `distance_maps: array<u32>`.
+pub const DISTANCE_TEXELS: &str = include_str!("../wgsl/distance_texels.wgsl");
 /// Twin of [`crate::camera`].
 pub const CAMERA: &str = include_str!("../wgsl/camera.wgsl");
 /// Twin of [`crate::culling`].

@@ -28,7 +28,8 @@ use std::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 A renderer NAME that is not built in (cpu, wgpu) is the program photonstream-renderer-NAME beside this one or on the PATH,
-called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V] [--epsilon L] [--culling C].
+called with: --channel C --out DIR [--headless] [--frames N] [--size WxH] [--kernel K] [--visibility V] [--shadow-map-px N] [--epsilon L]
+[--culling C].
 What crashes is started again; a built-in renderer then goes on with the next picture. Where no graphics device can draw,
 cpu takes the place of wgpu and of the window. Several renderers write to folders of their own in DIR.
 Without --renderer and --headless a window shows the light, if there is a display and a graphics adapter; closing it ends

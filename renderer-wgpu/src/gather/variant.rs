@@ -9,6 +9,17 @@ use crate::{
     targets::HDR,
 };
 
+/// What lights are shadowed by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Maps {
+    /// Nothing.
+    None,
+    /// The distance maps that were published with them.
+    Published,
+    /// Shadow maps that are drawn here.
+    Drawn,
+}
+
 /// A variant of a gathering pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Variant {
@@ -17,14 +28,15 @@ pub(super) struct Variant {
     pub(super) continues: bool,
     pub(super) interleaved: bool,
     pub(super) patches: bool,
-    pub(super) mapped: bool,
+    pub(super) maps: Maps,
 }
 
 /// The pipeline of a variant.
 pub(super) fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
     let ranged = ("RANGED", f64::from(variant.ranged));
     let patches = ("PATCHES", f64::from(variant.patches));
-    let mapped = ("MAPPED", f64::from(variant.mapped));
+    let mapped = ("MAPPED", f64::from(variant.maps != Maps::None));
+    let source = |published, drawn| if variant.maps == Maps::Drawn { drawn } else { published };
     let additive = Drawing { fragment: Some("add"), format: Some(HDR), additive: true, ..Drawing::default() };
     match variant.accumulation {
         Accumulation::Tiled => {
@@ -38,7 +50,7 @@ pub(super) fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
                 additive: false,
                 ..additive
             };
-            pipelines::drawing(gpu, &shader::TILED, &set)
+            pipelines::drawing(gpu, source(&shader::TILED, &shader::TILED_DRAWN), &set)
         }
         Accumulation::Splat => {
             let constants = [ranged, patches, mapped];
@@ -49,7 +61,7 @@ pub(super) fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
                 cull: Some(wgpu::Face::Front),
                 ..additive
             };
-            pipelines::drawing(gpu, &shader::SPLAT, &set)
+            pipelines::drawing(gpu, source(&shader::SPLAT, &shader::SPLAT_DRAWN), &set)
         }
         Accumulation::Forward => {
             let constants = [ranged, patches, mapped];
@@ -61,7 +73,7 @@ pub(super) fn pipeline(gpu: &Gpu, variant: Variant) -> wgpu::RenderPipeline {
                 depth: Some(depth_test(false, wgpu::CompareFunction::Equal)),
                 ..additive
             };
-            pipelines::drawing(gpu, &shader::FORWARD, &set)
+            pipelines::drawing(gpu, source(&shader::FORWARD, &shader::FORWARD_DRAWN), &set)
         }
     }
 }

@@ -8,6 +8,7 @@ mod edited;
 mod emissive;
 mod extremes;
 mod fence;
+mod few_lights;
 mod holes;
 mod only_what_changed;
 mod scenes;

@@ -7,7 +7,8 @@ use photonstream_shading::{basis, distance_map, wgsl};
 /// A map of 8² texels in the inputs' last words, each of which becomes two texels; receivers all around the light.
 #[test]
 fn distance_map() {
-    let parts = [wgsl::BASIS, "var<private> distance_maps: array<u32, 32>;", wgsl::DISTANCE_MAP];
+    let maps = "var<private> distance_maps: array<u32, 32>;";
+    let parts = [wgsl::BASIS, maps, wgsl::DISTANCE_TEXELS, wgsl::DISTANCE_MAP];
     let body = "let n = normalize(vec3f(x[0], x[1], x[2]) - 0.5);
         let t = basis_tangents(n);
         let to = (vec3f(x[3], x[4], x[5]) - vec3f(0.5, 0.5, 0.0)) * vec3f(4.0, 4.0, 2.0);

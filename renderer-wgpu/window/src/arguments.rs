@@ -2,7 +2,10 @@
 
 use crate::Fault;
 use photonstream_protocol::ChannelName;
-use photonstream_renderer::{LayerKind, cli::Size};
+use photonstream_renderer::{
+    LayerKind,
+    cli::{Size, shadow_map_px},
+};
 use photonstream_renderer_wgpu::cli::GpuArgs;
 use photonstream_scene::{RangeCulling, Visibility};
 use photonstream_shading::Kernel;
@@ -26,9 +29,12 @@ pub struct Args {
     /// How light falls off at first: patch, disc or paper; the scene's own if not given.
     #[arg(long, value_name = "K")]
     pub kernel: Option<Kernel>,
-    /// Shadows of indirect light at first: none, ao, rays or octahedral; the scene's own if not given.
+    /// Shadows of indirect light at first: none, ao, rays, octahedral or shadow-maps; the scene's own if not given.
     #[arg(long, value_name = "V")]
     pub visibility: Option<Visibility>,
+    /// Edge of each virtual surface light's shadow map at first: 32, 64, 128 or 256 texels; the scene's own if not given.
+    #[arg(long, value_name = "N", value_parser = shadow_map_px)]
+    pub shadow_map_px: Option<u32>,
     /// A virtual surface light's range ends where it adds less than this radiance, W m⁻² sr⁻¹; 0: never. The scene's own if
     /// not given.
     #[arg(long, value_name = "E")]

@@ -10,6 +10,9 @@ use photonstream_shading::{Camera, tone::ToneMap};
 /// Most stops of exposure up or down.
 pub(crate) const EXPOSURE_MOST: f32 = 20.0;
 
+/// Virtual surface lights up to which a device in software draws shadow maps of all where nobody says so.
+const FEW_LIGHTS: usize = 256;
+
 /// What the user has chosen to see.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Choices {
@@ -27,6 +30,7 @@ impl Choices {
         let mut view = View::from_settings(settings, camera);
         view.kernel = args.kernel.unwrap_or(view.kernel);
         view.visibility = args.visibility.unwrap_or(view.visibility);
+        view.shadow_map_px = args.shadow_map_px.unwrap_or(view.shadow_map_px);
         view.epsilon = args.epsilon.unwrap_or(view.epsilon);
         view.culling = args.culling.unwrap_or(view.culling);
         let gpu = args.gpu.choices();
@@ -36,11 +40,15 @@ impl Choices {
         Self { view, exposure_ev: settings.exposure_ev, tone_map: settings.tone_map }
     }
 
-    /// Takes the cheaper way where `args` do not say which: for rays the distance maps, where `has_maps`, else ambient occlusion;
-    /// and interleaved sampling.
-    pub(crate) fn ease(&mut self, args: &Args, has_maps: bool) {
+    /// Takes the cheaper way where `args` do not say which: for rays the distance maps, where `has_maps`, else shadow maps of at most
+    /// 256 of `vsls` lights, else ambient occlusion; and interleaved sampling.
+    pub(crate) fn ease(&mut self, args: &Args, has_maps: bool, vsls: usize) {
         if args.visibility.is_none() && self.view.visibility == Visibility::Rays {
-            self.view.visibility = if has_maps { Visibility::Octahedral } else { Visibility::Ao };
+            self.view.visibility = match vsls {
+                _ if has_maps => Visibility::Octahedral,
+                1..=FEW_LIGHTS => Visibility::ShadowMaps,
+                _ => Visibility::Ao,
+            };
         }
         if args.gpu.interleave.is_none() {
             self.view.interleave = 4;
@@ -130,15 +138,17 @@ mod tests {
 
     #[test]
     fn software_is_spared_what_nobody_asked_for() {
-        let eased_with = |line: &str, has_maps: bool| {
+        let eased_with = |line: &str, has_maps: bool, vsls: usize| {
             let args = Command::try_parse_from(line.split_whitespace()).unwrap().args;
             let (mut choices, _) = choices(line);
-            choices.ease(&args, has_maps);
+            choices.ease(&args, has_maps, vsls);
             (choices.view.visibility, choices.view.interleave)
         };
-        let eased = |line| eased_with(line, false);
-        assert_eq!(eased_with("w", true), (Visibility::Octahedral, 4));
-        assert_eq!(eased_with("w --visibility rays", true), (Visibility::Rays, 4));
+        let eased = |line| eased_with(line, false, 1000);
+        assert_eq!(eased_with("w", true, 20), (Visibility::Octahedral, 4));
+        assert_eq!(eased_with("w --visibility rays", true, 20), (Visibility::Rays, 4));
+        assert_eq!(eased_with("w", false, 20), (Visibility::ShadowMaps, 4));
+        assert_eq!(eased_with("w", false, 0), (Visibility::Ao, 4));
         assert_eq!(eased("w"), (Visibility::Ao, 4));
         assert_eq!(eased("w --visibility rays --interleave 1"), (Visibility::Rays, 1));
         assert_eq!(eased("w --visibility none"), (Visibility::None, 4));

@@ -10,6 +10,8 @@ use photonstream_scene::Visibility;
 pub(crate) struct Flaws {
     /// Lights beyond the last shadow map.
     unshadowed: u32,
+    /// Virtual surface lights beyond the last shadow map.
+    unshadowed_vsls: u32,
     /// Published records with impossible values.
     refused: u32,
     /// Standard error of indirect light by shadow rays, as rel. RMSE.
@@ -41,6 +43,8 @@ impl Flaws {
             return Ok(());
         }
         self.unshadowed = if view.shadows == Shadows::Maps { renderer.unshadowed_lights() } else { 0 };
+        let by_maps = view.visibility == Visibility::ShadowMaps && has_indirect(view);
+        self.unshadowed_vsls = if by_maps { renderer.unshadowed_vsls() } else { 0 };
         let counted = Some((frame.epoch, frame.frame, view.show));
         if self.counted != counted {
             self.refused = renderer.refused_records()?;
@@ -69,6 +73,12 @@ impl Flaws {
             let n = self.unshadowed;
             warnings.push(format!("{n} lights without shadows: too many for maps; choose shadows rays"));
         }
+        if self.unshadowed_vsls > 0 {
+            let n = self.unshadowed_vsls;
+            warnings.push(format!(
+                "{n} indirect lights without shadows: too many for maps; choose visibility rays"
+            ));
+        }
         if self.refused > 0 {
             let n = self.refused;
             warnings.push(format!("{n} published lights have impossible values and are not shown"));
@@ -85,6 +95,9 @@ pub(crate) fn approximation(view: &View) -> Option<String> {
     }
     if view.visibility == Visibility::Octahedral {
         words.push("shadows from distance maps".to_owned());
+    }
+    if view.visibility == Visibility::ShadowMaps {
+        words.push(format!("shadow maps of {0}×{0}", view.shadow_map_px));
     }
     if view.interleave > 1 && view.visibility != Visibility::Rays {
         words.push(format!("interleaved {0}×{0}", view.interleave));
@@ -108,9 +121,14 @@ mod tests {
     fn only_what_falls_short_is_told() {
         let flawless = Flaws { noise: Some(0.0), ..Flaws::default() };
         assert_eq!((flawless.warnings(), flawless.noise()), (vec![], None));
-        let flaws = Flaws { unshadowed: 3, refused: 7, noise: Some(0.02), ..Flaws::default() };
+        let flaws =
+            Flaws { unshadowed: 3, unshadowed_vsls: 5, refused: 7, noise: Some(0.02), ..Flaws::default() };
         let warnings = flaws.warnings();
-        assert!(warnings.len() == 2 && warnings[0].starts_with("3 lights") && warnings[1].starts_with("7 "));
+        let begins = ["3 lights", "5 indirect", "7 "];
+        assert!(
+            warnings.len() == 3 && warnings.iter().zip(begins).all(|(w, b)| w.starts_with(b)),
+            "{warnings:?}"
+        );
         assert_eq!(flaws.noise(), Some(0.02));
     }
 
@@ -131,6 +149,7 @@ mod tests {
             say(Visibility::Ao, 4).as_deref(),
             Some("approximate: ambient occlusion, interleaved 4×4")
         );
+        assert_eq!(say(Visibility::ShadowMaps, 1).as_deref(), Some("approximate: shadow maps of 128×128"));
         assert_eq!(approximation(&view(Visibility::Ao, 4, LayerKind::Albedo)), None);
     }
 }

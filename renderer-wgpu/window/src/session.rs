@@ -142,7 +142,9 @@ impl Session {
             if self.eases {
                 let frame = &published.frame;
                 let has_maps = distance_map_edge(frame.distances.len(), frame.vsls.len()).is_some();
-                self.choices.iter_mut().for_each(|choices| choices.ease(&self.args, has_maps));
+                self.choices
+                    .iter_mut()
+                    .for_each(|choices| choices.ease(&self.args, has_maps, frame.vsls.len()));
             }
         }
         let is_gone = match &self.selected {

@@ -3,7 +3,7 @@
 use crate::{
     config::{Field, RenderConfig, StreamingConfig},
     error::SceneError,
-    settings::{RenderSettings, StreamingSettings, Visibility},
+    settings::{RenderSettings, SHADOW_MAP_EDGES, StreamingSettings, Visibility},
 };
 use photonstream_shading::distance_map;
 
@@ -101,12 +101,18 @@ pub(super) fn render(config: &mut RenderConfig, field: &Field<'_>) -> Result<Ren
     let height = *config.height_px.get_or_insert(d.height);
     let epsilon = *config.epsilon.get_or_insert(widen(d.epsilon));
     let light_samples = *config.light_samples.get_or_insert(d.light_samples);
+    let shadow_map_px = *config.shadow_map_px.get_or_insert(d.shadow_map_px);
+    if !SHADOW_MAP_EDGES.contains(&shadow_map_px) {
+        let remedy = "choose one of them, or leave the key out";
+        return Err(field.key("shadow_map_px").invalid(shadow_map_px, "32, 64, 128 or 256", remedy));
+    }
     let exposure_ev = *config.exposure_ev.get_or_insert(widen(d.exposure_ev));
     Ok(RenderSettings {
         width: field.key("width_px").count(width, 1..=MAX_PICTURE_PX)?,
         height: field.key("height_px").count(height, 1..=MAX_PICTURE_PX)?,
         kernel: *config.kernel.get_or_insert(d.kernel),
         visibility: *config.visibility.get_or_insert(d.visibility),
+        shadow_map_px,
         epsilon: field
             .key("epsilon")
             .number(epsilon, "a radiance from 0 to 1e6 W/(m² sr)", |x| (0.0..=1e6).contains(&x))?

@@ -145,6 +145,7 @@ fn every_key() -> SceneConfig {
             height_px: Some(1),
             kernel: Some(Kernel::Paper),
             visibility: Some(Visibility::None),
+            shadow_map_px: Some(32),
             epsilon: Some(1.0),
             culling: Some(RangeCulling::Cut),
             light_samples: Some(1),

@@ -305,6 +305,8 @@ pub struct RenderConfig {
     /// Whether virtual surface lights are shadowed.
     #[serde(default, with = "values::by_name")]
     pub visibility: Option<Visibility>,
+    /// Edge of the shadow maps of virtual surface lights in texels.
+    pub shadow_map_px: Option<u32>,
     /// Smallest radiance worth adding, W m⁻² sr⁻¹.
     pub epsilon: Option<f64>,
     /// Whether lights beyond their range are skipped or drawn by lot.

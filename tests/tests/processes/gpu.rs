@@ -109,7 +109,10 @@ fn options_that_cannot_be_are_refused_in_words() {
     let said = ground.run(&["run", &scene, "--rays", "4", "--headless"]);
     said.expect(2, &["--rays 4 is for --renderer wgpu alone"]);
     let said = ground.run(&[&render[..], &["--visibility", "ao"]].concat());
-    said.expect(1, &["visibility: found ao, expected none, rays or octahedral here", "--renderer wgpu"]);
+    said.expect(
+        1,
+        &["visibility: found ao, expected none, rays, octahedral or shadow-maps here", "--renderer wgpu"],
+    );
     let gpu = [&render[..], &["--renderer", "wgpu"]].concat();
     let said = ground.run(&[&gpu[..], &["--adapter", "no such adapter"]].concat());
     said.expect(6, &["no graphics adapter can be used", "--renderer cpu"]);

@@ -8,7 +8,7 @@ use crate::{
 use egui::{ComboBox, Context, Grid, Slider, SliderClamping, Ui, pos2};
 use photonstream_protocol::Request;
 use photonstream_renderer_wgpu::{Accumulation, Shadows};
-use photonstream_scene::{Scene, Visibility};
+use photonstream_scene::{SHADOW_MAP_EDGES, Scene, Visibility};
 use photonstream_shading::{Kernel, tone::ToneMap};
 
 pub(super) fn show(ctx: &Context, session: &mut Session) {
@@ -59,6 +59,15 @@ fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {
     row(ui, "visibility", |ui| {
         named(ui, "visibility", &mut view.visibility, Visibility::ALL, Visibility::name);
     });
+    if view.visibility == Visibility::ShadowMaps {
+        row(ui, "map texels", |ui| {
+            ui.horizontal(|ui| {
+                for n in SHADOW_MAP_EDGES {
+                    ui.selectable_value(&mut view.shadow_map_px, n, n.to_string());
+                }
+            });
+        });
+    }
     if view.visibility == Visibility::Rays {
         row(ui, "rays per pixel", |ui| {
             let text = |n: f64, _: std::ops::RangeInclusive<usize>| match n {
