@@ -216,6 +216,11 @@ fn numbers_outside_their_domain_are_refused() {
             "[render]\nculling = \"some\"",
             ":23:11: render.culling: unknown culling \"some\"; expected one of: cut, stochastic",
         ),
+        (
+            "vsls = 100",
+            "[render]\nshadow_map_px = 48",
+            ":23:17: render.shadow_map_px: found 48, expected 32, 64, 128 or 256",
+        ),
         ("vsls = 100", "[render]\nexposure_ev = 99", ":23:15: render.exposure_ev: found 99, expected stops"),
         (
             "outer_half_angle_deg = 30",
