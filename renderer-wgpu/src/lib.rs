@@ -5,6 +5,9 @@ pub mod cli;
 mod deferred;
 mod draw;
 mod error;
+#[cfg(test)]
+#[path = "../tests/pictures/fence.rs"]
+mod fence;
 mod frame;
 mod gather;
 mod geometry;

@@ -2,13 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::{readback, test_gpu::gpu, timer::Timer};
+use crate::{fence, readback, test_gpu::gpu, timer::Timer};
 use photonstream_scene::{SHADOW_MAP_EDGES, Scene, SceneConfig, bvh::Ray};
 use photonstream_shading::distance_map;
 use std::path::Path;
-
-#[path = "../../tests/pictures/fence.rs"]
-mod fence;
 
 fn scene(text: &str) -> Scene {
     SceneConfig::from_text(text, Path::new("test.toml")).unwrap().build().unwrap()

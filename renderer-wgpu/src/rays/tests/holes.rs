@@ -1,10 +1,7 @@
 //! Turns plates full of holes into the claim that rays pass through them on the device where they do on the CPU.
 
 use super::{answers::device, *};
-use crate::rays::holes::check_buffers;
-
-#[path = "../../../tests/pictures/fence.rs"]
-mod fence;
+use crate::{fence, rays::holes::check_buffers};
 
 fn plates(holes: bool) -> Scene {
     let folder = tempfile::tempdir().unwrap();
