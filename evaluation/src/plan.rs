@@ -103,6 +103,11 @@ pub const METHODS: &str = "methods";
 /// The scene as its config says.
 pub const CONFIG: &str = "config";
 
+/// The ways of shadowing that differ for photon streaming: shadow maps are for methods with fewer lights, and rays on the CPU.
+pub fn shadows() -> impl Iterator<Item = Visibility> {
+    Visibility::ALL.iter().copied().filter(|&visibility| visibility != Visibility::ShadowMaps)
+}
+
 /// All points of a scene but those of path tracing, which go on until the time is over. `base` is the scene as its config
 /// says; equal points are measured once. `ways` are those of the graphics device, its default first; none without a device;
 /// `few` are the methods of few lights that the scene can have.
@@ -118,11 +123,11 @@ pub fn plan(base: &Point, effort: Effort, ways: &[Way], few: &[Point]) -> Vec<Pl
     };
     add(CONFIG, base.clone());
     for &kernel in Kernel::ALL.iter() {
-        for &visibility in Visibility::ALL {
+        for visibility in shadows() {
             add(SHADING, Point { kernel, visibility, ..base.clone() });
         }
     }
-    for &visibility in Visibility::ALL {
+    for visibility in shadows() {
         for &(vsls, pool) in effort.pairs() {
             add(TIME, Point { vsls, pool, visibility, ..base.clone() });
         }
@@ -175,7 +180,7 @@ pub fn plan(base: &Point, effort: Effort, ways: &[Way], few: &[Point]) -> Vec<Pl
         add(ACCUMULATION, on_device(base, way, Visibility::None));
     }
     if let Some(way) = ways.first() {
-        for &visibility in Visibility::ALL {
+        for visibility in shadows() {
             add(ACCUMULATION, on_device(base, way, visibility));
         }
         for visibility in [Visibility::None, Visibility::Octahedral, base.visibility] {
@@ -227,7 +232,7 @@ mod tests {
         }
         let has = |what: &dyn Fn(&Point) -> bool| planned.iter().any(|p| what(&p.point));
         assert!(Kernel::ALL.iter().all(|&k| has(&|p| p.kernel == k)));
-        assert!(Visibility::ALL.iter().all(|&v| has(&|p| p.visibility == v)));
+        assert!(shadows().all(|v| has(&|p| p.visibility == v)) && shadows().count() == 4);
         assert!(
             Method::ALL
                 .iter()

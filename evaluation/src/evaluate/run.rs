@@ -237,7 +237,7 @@ impl Run<'_, '_> {
         let mut bench = Bench::new(scene, size);
         let kinds: Vec<(Kernel, Visibility)> = Kernel::ALL
             .iter()
-            .flat_map(|&kernel| Visibility::ALL.iter().map(move |&visibility| (kernel, visibility)))
+            .flat_map(|&kernel| plan::shadows().map(move |visibility| (kernel, visibility)))
             .collect();
         for (index, &(kernel, visibility)) in kinds.iter().enumerate() {
             let what = format!("split: {}, {}", kernel.name(), visibility.name());
