@@ -3,26 +3,35 @@
 
 use crate::{
     edits::values,
-    service::{PATIENCE, start},
+    service::{PATIENCE, start, start_with},
     service_edits::{flux, frame_where, is_converged},
     support::scene,
 };
 use photonstream_protocol::{Reply, Request, VslFrame};
 use photonstream_scene::{Method, Scene};
-use photonstream_simulator::{few_lights::FewLights, simulation::Simulation};
+use photonstream_simulator::{
+    cli::Overrides,
+    few_lights::FewLights,
+    service::{ConfigSource, Options},
+    simulation::Simulation,
+};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// A room of 4 m with a spot that shines down, and a VPL on each of floor and left wall.
 fn room(streaming: &str) -> Scene {
-    scene(&format!(
+    scene(&text(streaming))
+}
+
+fn text(streaming: &str) -> String {
+    format!(
         "[material.a]\nalbedo = 0.6\n\
          [object.room]\nmaterial = \"a\"\nsides = \"back\"\nbox = {{ size_m = [4, 4, 4] }}\n\
          [light.torch]\npower_w = 30\nspot = {{ position_m = [0, 1, 0], direction = [0, -1, 0], outer_half_angle_deg = 25 }}\n\
          [[vpl]]\nposition_m = [0, -2, 0]\nnormal = [0, 1, 0]\nalbedo = 0.6\nweight = 1\n\
          [[vpl]]\nposition_m = [-2, 0, 0]\nnormal = [1, 0, 0]\nalbedo = 0.6\nweight = 1\n\
          [streaming]\nvsls = 60\npool_paths = 2000\npublish_period_ms = 1\n{streaming}\n"
-    ))
+    )
 }
 
 fn set_streaming(keys: Value) -> Request {
@@ -132,6 +141,40 @@ fn vpls_are_edited_while_it_runs() {
     let reply = client.request(&set_streaming(json!({ "publish_period_ms": 2 })), PATIENCE).unwrap();
     let kept = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
     assert_eq!(flux(&kept), flux(&more));
+    service.end();
+}
+
+/// The config's method is changed where it lies: readers see the other light, edits of VPLs are saved into it and stay.
+#[test]
+fn configs_change_methods_and_take_edits() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("room.toml");
+    let camera = "[camera]\nposition_m = [0, 0, 5]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n";
+    let write =
+        |streaming: &str| std::fs::write(&file, format!("# Mine.\n{}{camera}", text(streaming))).unwrap();
+    write("");
+    let mut source = ConfigSource::new(&file, Overrides::default());
+    let first = Simulation::new(Arc::new(source.load().unwrap()));
+    let options = Options { config: Some(source), threads: Some(1), ..Options::default() };
+    let service = start_with("few-config", &first, options);
+    let (mut subscriber, mut client) = (service.attach(), service.connect());
+    let streamed = frame_where(&mut subscriber, 1, |_| (), is_converged);
+    assert!(streamed.vsls.len() >= 60);
+    write("method = \"static-vpl\"");
+    let wanted = expected(&first.scene, Method::StaticVpl);
+    let few = frame_where(&mut subscriber, 1, |_| (), |frame| flux(frame) == wanted);
+    let vpl = json!({ "position_m": [0.25, -2, 0], "normal": [0, 1, 0], "albedo": 0.6, "weight": 1 });
+    let set = Request::SetVpls { values: values(json!({ "vpl": [vpl] })) };
+    let reply = client.request(&set, PATIENCE).unwrap();
+    frame_where(&mut subscriber, number(&reply), |_| (), |frame| frame.vsls.len() == 1);
+    number(&client.request(&Request::SaveVpls {}, PATIENCE).unwrap());
+    let saved = std::fs::read_to_string(&file).unwrap();
+    assert!(saved.starts_with("# Mine.") && saved.contains("position_m = [0.25, -2.0, 0.0]"), "{saved}");
+    assert_eq!(saved.matches("[[vpl]]").count(), 1);
+    // What was saved is the config now, and the light stays.
+    let reloaded = |frame: &VslFrame| frame.config_generation > few.config_generation;
+    let after = frame_where(&mut subscriber, 1, |_| (), reloaded);
+    assert_eq!((after.vsls.len(), after.vsls[0].position), (1, [0.25, -2.0, 0.0]));
     service.end();
 }
 
