@@ -80,7 +80,6 @@ fn defaults(has_proxies: bool) -> VplsConfig {
         second_bounce_albedo: widen(settings.second_bounce_albedo),
         second_bounce_distance_m: widen(settings.second_bounce_distance),
         photons: Some(settings.photons),
-        ..VplsConfig::default()
     }
 }
 
