@@ -22,6 +22,7 @@ mod primitives;
 mod scene;
 mod settings;
 mod texturing;
+pub mod vpl_placement;
 pub mod vpls;
 
 pub use animation::Animation;

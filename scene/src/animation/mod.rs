@@ -115,6 +115,16 @@ impl Animation {
         })
     }
 
+    /// Whether an object is ever moved.
+    pub(crate) fn moves_object(&self, object: &Object) -> bool {
+        let rides = |rider: &Rider| matches!(rider.kind, RiderKind::Object(_)) && rider.name == object.name;
+        self.rigs.iter().flat_map(|rig| &rig.riders).any(rides)
+            || self.targets.iter().any(|target| {
+                let moves = |property| target.kind.moves_surface(property);
+                object.is_called(&target.name) && target.tracks.iter().any(|(property, _)| moves(*property))
+            })
+    }
+
     /// The numbers of objects and of lights that move; lights move with the objects that show them.
     pub(crate) fn moving(&self, objects: &[Object], lights: &[SceneLight]) -> (u32, u32) {
         let moves = |target: &Target, surface: bool| {
