@@ -87,6 +87,8 @@ pub(crate) enum Command {
     Replay(replay::Args),
     /// Write the scene file that a model without one is shown with, to be edited
     Config(config::Args),
+    /// Place static virtual point lights in a scene, and write it as a scene file to be edited
+    Place(place::Args),
     /// Validate a scene and say what will be modelled, and why
     Check(check::Args),
     /// List what is running, and what a crash left

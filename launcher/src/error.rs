@@ -7,7 +7,7 @@ use photonstream_mitsuba::ExportError;
 use photonstream_protocol::ProtocolError;
 use photonstream_recording::RecordingError;
 use photonstream_renderer::RenderError;
-use photonstream_scene::SceneError;
+use photonstream_scene::{SceneError, vpl_placement::VplPlacementError};
 use photonstream_simulator::error::SimulatorError;
 use std::{io, path::PathBuf};
 
@@ -17,6 +17,9 @@ pub(crate) enum LauncherError {
     /// The scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Placement of virtual point lights.
+    #[error(transparent)]
+    Placement(#[from] VplPlacementError),
     /// The channel.
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
@@ -162,6 +165,7 @@ impl LauncherError {
             Self::Window(error) if error.is_of_device() => exit::DEVICE,
             Self::Interrupted => exit::INTERRUPTED,
             Self::Usage(_) | Self::Assignment(_) | Self::UnknownRenderer { .. } => exit::USAGE,
+            Self::Placement(VplPlacementError::Setting { .. }) => exit::USAGE,
             Self::Child { code, .. } => *code,
             Self::SimulatorEnded { .. } => exit::CHILD,
             _ => exit::FAILED,

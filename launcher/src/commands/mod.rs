@@ -10,6 +10,7 @@ pub(crate) mod default_run;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod inspect;
+pub(crate) mod place;
 pub(crate) mod record;
 pub(crate) mod reference;
 pub(crate) mod render;
@@ -48,6 +49,7 @@ pub(crate) fn dispatch(program: Program) -> Result<(), LauncherError> {
         Some(Command::Replay(args)) => replay::run(&args, global),
         Some(Command::Set(args)) => set::run(&args, global),
         Some(Command::Config(args)) => config::run(&args, global),
+        Some(Command::Place(args)) => place::run(&args, global),
         Some(Command::Check(args)) => check::run(&args, global),
         Some(Command::Channels(args)) => channels::run(&args, global),
         Some(Command::Clean(args)) => clean::run(&args, global),
