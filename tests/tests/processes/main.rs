@@ -13,6 +13,7 @@ mod main_job;
 mod messages;
 mod models;
 mod notices;
+mod placing;
 mod plug_ins;
 mod replay;
 mod reports;

@@ -2,7 +2,7 @@
 
 use crate::harness::{Ground, config, has_keys};
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "run",
     "simulate",
     "render",
@@ -14,6 +14,7 @@ const COMMANDS: [&str; 14] = [
     "set",
     "check",
     "config",
+    "place",
     "channels",
     "clean",
     "bench",
