@@ -69,6 +69,8 @@ fn cameras_see_reflecting_sides() {
         "cornell-light.toml",
         "cornell-ball.toml",
         "door-room.toml",
+        "cell.toml",
+        "spindle.toml",
         "integrating-sphere.toml",
         "two-rooms.toml",
         "bunny.toml",

@@ -33,8 +33,8 @@ Examples:
   photonstream place room.toml --out room.toml --spacing-m 0.5 --from 0,1.5,0 --from 4,1.5,0
   photonstream place model.glb --out model.toml
 
-JSON: { \"scene\", \"out\", \"vpls\", \"attached\", \"by_hand\", \"edited\", \"deleted\", \"replaced\", \"left_out\", \"taken\", \"spacing_m\",
-  \"origins\", \"reflections\", \"seconds\" }")]
+JSON: { \"scene\", \"out\", \"vpls\", \"attached\", \"by_hand\", \"edited\", \"deleted\", \"replaced\", \"left_out\", \"taken\", \"without_surface\",
+  \"spacing_m\", \"origins\", \"reflections\", \"seconds\" }")]
 pub(crate) struct Args {
     /// Scene file or model
     config: PathBuf,
@@ -90,6 +90,7 @@ struct Report {
     replaced: u32,
     left_out: u32,
     taken: u32,
+    without_surface: u32,
     spacing_m: f32,
     origins: u32,
     reflections: u32,
@@ -114,7 +115,7 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let begun = Instant::now();
     let placement = place_vpls(&scene, &settings(args), &file.taken(&scene))?;
     let seconds = begun.elapsed().as_secs_f64();
-    let text = file.with(&scene, &placement, 1.0);
+    let text = file.with(&scene, &placement, scene.vpls.settings.area_per_weight.into());
     SceneConfig::from_text(&text, &args.out)?;
     write(&args.out, &text).map_err(|e| LauncherError::io("write", &args.out, e))?;
     output::report(global.json, &report(args, &scene, &placement, (counts, seconds)), text_of)
@@ -143,9 +144,8 @@ fn opened(config: &Path, out: &Path) -> Result<(Scene, VplFile), LauncherError> 
     let is_same = out.canonicalize().is_ok_and(|out| config.canonicalize().is_ok_and(|config| out == config));
     if out.exists() && !is_same {
         let text = read(out)?;
-        let (given, there) = (SceneConfig::from_file(config)?, SceneConfig::from_text(&text, out)?);
-        let scene = there.build()?;
-        let given = given.build()?;
+        let scene = built(SceneConfig::from_text(&text, out)?)?;
+        let given = built(SceneConfig::from_file(config)?)?;
         if !have_one_shape(&given, &scene) {
             return Err(LauncherError::Usage(format!(
                 "{out} is there already, and its objects, materials or lights are not those of {config}; VPLs in it are \
@@ -160,10 +160,16 @@ fn opened(config: &Path, out: &Path) -> Result<(Scene, VplFile), LauncherError> 
         true => ModelScene::of(config, &ModelOptions::default())?.text,
         false => read(config)?,
     };
-    let scene = SceneConfig::from_text(&text, config)?.build()?;
+    let scene = built(SceneConfig::from_text(&text, config)?)?;
     let mut file = VplFile::parse(&text, config)?;
     file.rebase_assets(config, out);
     Ok((scene, file))
+}
+
+/// The scene, whose method may need the VPLs that it is to get.
+fn built(mut config: SceneConfig) -> Result<Scene, LauncherError> {
+    config.streaming.method = None;
+    Ok(config.build()?)
 }
 
 /// Whether two scenes have the same surfaces and lights.
@@ -210,6 +216,7 @@ fn report(
         replaced: counts.replaced,
         left_out: placement.left_out,
         taken: placement.taken,
+        without_surface: placement.without_surface,
         spacing_m: placement.spacing_m,
         origins: placement.origins,
         reflections: placement.reflections,
@@ -236,7 +243,7 @@ fn text_of(report: &Report) -> String {
         ));
     }
     if *left_out > 0 {
-        out.push_str(&format!("{left_out} more are beyond --max {vpls}\n"));
+        out.push_str(&format!("{left_out} more are beyond --max\n"));
     }
     out
 }

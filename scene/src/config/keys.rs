@@ -163,6 +163,7 @@ fn every_key() -> SceneConfig {
             second_bounce_albedo: Some(1.0),
             second_bounce_distance_m: Some(1.0),
             photons: Some(1),
+            placed: Some(PlacedConfig { sites: vec!["a".into()] }),
         }),
         vpl: vec![VplConfig {
             position_m: v,
@@ -170,6 +171,7 @@ fn every_key() -> SceneConfig {
             albedo: OneOrThree([0.5; 3]),
             weight: Some(1.0),
             object: Some("o".into()),
+            placed: Some("a".into()),
         }],
         blocker: vec![BlockerConfig { position_m: v, radius_m: 1.0, object: Some("o".into()) }],
         proxy: vec![ProxyConfig {

@@ -17,7 +17,9 @@ pub use domain::{MAX_LENGTH_M, MAX_POWER};
 pub use imports::{AnimationChoice, GltfConfig, LightOverride, ObjConfig, PartOverride, PlyConfig, UpAxis};
 pub use sky::SkyConfig;
 pub use values::{OneOrThree, Vector};
-pub use vpls::{BlockerConfig, HullConfig, ProxyConfig, ProxySphereConfig, VplConfig, VplsConfig};
+pub use vpls::{
+    BlockerConfig, HullConfig, PlacedConfig, ProxyConfig, ProxySphereConfig, VplConfig, VplsConfig,
+};
 
 use crate::{
     scene::Sides,

@@ -31,6 +31,18 @@ pub struct VplsConfig {
     pub second_bounce_distance_m: Option<f64>,
     /// Photons of instant radiosity.
     pub photons: Option<u32>,
+    /// What `photonstream place` has written.
+    pub placed: Option<PlacedConfig>,
+}
+
+/// `[vpls.placed]`: what [`crate::vpl_placement::VplFile`] reads to tell what people have edited and deleted; without
+/// effect on the scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlacedConfig {
+    /// Hash, position and normal of each.
+    #[serde(default)]
+    pub sites: Vec<String>,
 }
 
 /// `[[vpl]]`: a place that may reflect light.
@@ -47,6 +59,8 @@ pub struct VplConfig {
     pub weight: Option<f64>,
     /// Name of the object with which it moves.
     pub object: Option<String>,
+    /// Hash of what `photonstream place` has written; without effect on the scene.
+    pub placed: Option<String>,
 }
 
 /// `[[blocker]]`: a sphere that keeps light from VPLs.

@@ -76,8 +76,7 @@ fn owner_of(point: &Place, shares: &[Share], reach_m: f32) -> Option<usize> {
     let distance_sq = |share: &Share| {
         let own = share.kind.is_none_or(|kind| kind.moving == point.kind.moving);
         let distance_sq = share.position.distance_squared(point.position);
-        let fits =
-            own && share.normal.dot(point.normal) >= COS_TOGETHER && distance_sq < reach_m * reach_m;
+        let fits = own && share.normal.dot(point.normal) >= COS_TOGETHER && distance_sq < reach_m * reach_m;
         let is_alike = share.kind.is_none_or(|kind| kind.is_alike(&point.kind));
         fits.then_some(if is_alike { distance_sq } else { UNLIKE * distance_sq })
     };

@@ -70,10 +70,12 @@ pub struct VplPlacement {
     pub left_out: u32,
     /// Clusters left out for what is there already.
     pub taken: u32,
+    /// Clusters left out because all surface around them is nearer to others.
+    pub without_surface: u32,
 }
 
-/// Steps of the spacing that is looked for: each is 2^¼ finer, from the radius of the scene down to a 1024th of it.
-const SPACINGS: i32 = 40;
+/// Steps of the spacing that is looked for: each is 2^⅛ finer, from the radius of the scene down to a 1024th of it.
+const SPACINGS: i32 = 80;
 
 /// Places VPLs: explores free space, traces diffuse paths from there and from the lights, puts together what lies near and
 /// looks the same way, and keeps the most populous. Equal for any number of threads.
@@ -120,13 +122,12 @@ pub fn place_vpls(
             kind: Some(kinds.get(vpl.object)),
         });
         let others = taken.iter().filter(|site| site.takes_surface);
-        let others =
-            others.map(|site| Share { position: site.position, normal: site.normal, kind: None });
+        let others = others.map(|site| Share { position: site.position, normal: site.normal, kind: None });
         let shares: Vec<Share> = own.chain(others).collect();
         let sequence = Sequence::new(settings.seed, first + streams);
         let areas = area::areas(scene, &kinds, (&reflections, spacing_m), &shares, sequence);
         vpls.iter_mut().zip(areas).for_each(|(vpl, area)| vpl.area_m2 = Some(area));
-        // Shrunk to nothing between others: it would never shine.
+        // It would never shine.
         vpls.retain(|vpl| vpl.area_m2 != Some(0.0));
     }
     let bias = settings.normal_bias_m as f32;
@@ -135,8 +136,9 @@ pub fn place_vpls(
         spacing_m,
         origins: streams,
         reflections: reflections.len() as u32,
-        left_out: (free - vpls.len()) as u32,
+        left_out: (free - kept.len()) as u32,
         taken: (found.len() - free) as u32,
+        without_surface: (kept.len() - vpls.len()) as u32,
         vpls,
     })
 }
@@ -144,8 +146,7 @@ pub fn place_vpls(
 /// Where paths start: what is explored from each start, by default the camera's eye, and the lights.
 fn origins(scene: &Scene, settings: &VplPlacementSettings) -> Vec<Vec3> {
     let eye = [scene.camera.position];
-    let given: Vec<Vec3> =
-        settings.starts.iter().map(|start| (*start - scene.origin_m).as_vec3()).collect();
+    let given: Vec<Vec3> = settings.starts.iter().map(|start| (*start - scene.origin_m).as_vec3()).collect();
     let starts = if given.is_empty() { &eye[..] } else { &given };
     let mut origins = Vec::new();
     for (stream, start) in (0..).zip(starts) {
@@ -158,7 +159,7 @@ fn origins(scene: &Scene, settings: &VplPlacementSettings) -> Vec<Vec3> {
 
 /// The finest spacing that needs no more than `most` clusters.
 fn fitting(reflections: &[Reflection], radius_m: f32, most: u32) -> (f32, (Vec<Cluster>, Vec<u32>)) {
-    let spacing = |step: i32| radius_m * (-0.25 * step as f32).exp2();
+    let spacing = |step: i32| radius_m * (-0.125 * step as f32).exp2();
     let (mut fits, mut best) = (0, clusters(reflections, spacing(0)));
     let mut too_fine = SPACINGS + 1;
     while too_fine - fits > 1 {

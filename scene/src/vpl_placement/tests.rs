@@ -81,8 +81,7 @@ fn the_spacing_fits_the_number() {
         assert_eq!(chosen.left_out, 0);
         assert!(chosen.vpls.len() <= most as usize && chosen.vpls.len() > most as usize / 2);
         let finer = f64::from(chosen.spacing_m) / 1.5;
-        let finer =
-            place(&scene, &VplPlacementSettings { most, spacing_m: Some(finer), ..settings() });
+        let finer = place(&scene, &VplPlacementSettings { most, spacing_m: Some(finer), ..settings() });
         assert!(finer.vpls.len() + finer.left_out as usize > most as usize);
         assert!(finer.vpls.len() <= most as usize);
     }
@@ -165,8 +164,7 @@ fn nothing_is_placed_in_a_sealed_room() {
     }
     let there = VplPlacementSettings { starts: vec![DVec3::new(1.8, 1.2, 0.9)], ..settings() };
     let found = place(&scene, &there);
-    let is_right =
-        |vpl: &PlacedVpl| scene.objects[vpl.object.0 as usize].name.starts_with("right-");
+    let is_right = |vpl: &PlacedVpl| scene.objects[vpl.object.0 as usize].name.starts_with("right-");
     assert!(found.vpls.iter().any(is_right));
 }
 
@@ -190,7 +188,8 @@ fn vpls_lie_on_curved_surfaces() {
     let outside = vec![DVec3::new(0.0, 0.0, 3.0), DVec3::new(2.0, -1.0, -1.0)];
     for (text, starts) in [(ball.clone(), Vec::new()), (ball.replace("\"back\"", "\"front\""), outside)] {
         let scene = of_text(&text);
-        let settings = VplPlacementSettings { spacing_m: Some(0.5), population: 1 << 15, starts, ..settings() };
+        let settings =
+            VplPlacementSettings { spacing_m: Some(0.5), population: 1 << 15, starts, ..settings() };
         let found = place(&scene, &settings);
         assert!(found.vpls.len() > 8, "{}", found.vpls.len());
         for vpl in &found.vpls {
@@ -232,9 +231,8 @@ fn sites_that_are_taken_stay_free() {
         let site = floor(corner, takes_surface);
         let found = place_vpls(&scene, &settings, &[site]).unwrap();
         assert!(found.taken > 0 && found.vpls.len() + found.taken as usize == alone.vpls.len());
-        let is_near = |vpl: &PlacedVpl| {
-            vpl.position.distance(corner) < 0.4 && vpl.normal.dot(Vec3::Y) > COS_TOGETHER
-        };
+        let is_near =
+            |vpl: &PlacedVpl| vpl.position.distance(corner) < 0.4 && vpl.normal.dot(Vec3::Y) > COS_TOGETHER;
         assert!(alone.vpls.iter().any(is_near) && !found.vpls.iter().any(is_near));
         let sum = |vpls: &[PlacedVpl]| vpls.iter().map(|vpl| vpl.area_m2.unwrap()).sum::<f32>();
         // What is there takes its part of the floor; where one was taken away, its neighbours have it.
@@ -296,8 +294,7 @@ point = { position_m = [0.5, 1, -0.5] }
 vsls = 100000
 ";
     let roots = AssetRoots { folders: vec![folder.path().to_owned()] };
-    let scene =
-        SceneConfig::from_text(text, Path::new("x.toml")).unwrap().build_with(&roots).unwrap();
+    let scene = SceneConfig::from_text(text, Path::new("x.toml")).unwrap().build_with(&roots).unwrap();
     let found = place(&scene, &VplPlacementSettings { spacing_m: Some(2.0), ..settings() });
     let [vpl] = found.vpls[..] else { panic!("{found:?}") };
     // About a thousand reflections, stratified: 5 σ of as many at random, 0.4 / √1000 each.

@@ -26,7 +26,8 @@ fn placed_lights_can_be_edited() {
     let first = ground.json(&place(&scene, "one.toml", &["--json"]));
     has_keys(
         &first,
-        &"scene out vpls attached by_hand edited deleted replaced left_out taken spacing_m origins reflections seconds"
+        &"scene out vpls attached by_hand edited deleted replaced left_out taken without_surface spacing_m origins reflections \
+         seconds"
             .split_whitespace()
             .collect::<Vec<_>>(),
     );
@@ -45,7 +46,8 @@ fn placed_lights_can_be_edited() {
         format!("{values}{}", rest.split_once('\n').unwrap().1)
     });
     ground.write("one.toml", &text);
-    let again = ground.json(&["place", "one.toml", "--out", "one.toml", "--seed", "5", "--max", "40", "--json"]);
+    let again =
+        ground.json(&["place", "one.toml", "--out", "one.toml", "--seed", "5", "--max", "40", "--json"]);
     let count = |key: &str| again[key].as_u64().unwrap();
     assert_eq!([count("by_hand"), count("edited"), count("deleted")], [1, 1, 1]);
     let text = fs::read_to_string(ground.path("one.toml")).unwrap();
@@ -73,7 +75,9 @@ fn what_makes_no_sense_is_named() {
     let ground = Ground::new();
     let scene = config("cornell-box.toml");
     ground.run(&["place", &scene]).expect(2, &["--out"]);
-    ground.run(&place(&scene, "a.toml", &["--depth", "0"])).expect(2, &["depth: found 0, expected a whole number"]);
+    ground
+        .run(&place(&scene, "a.toml", &["--depth", "0"]))
+        .expect(2, &["depth: found 0, expected a whole number"]);
     ground.run(&place(&scene, "a.toml", &["--from", "1,2"])).expect(2, &["expected three numbers of metres"]);
     ground.run(&place(&scene, "a.glb", &[])).expect(2, &["a.glb is called like a model"]);
     ground.run(&place("nowhere.toml", "a.toml", &[])).expect(1, &["cannot read nowhere.toml"]);

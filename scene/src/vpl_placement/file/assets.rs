@@ -21,10 +21,11 @@ pub(super) fn rebase(document: &mut DocumentMut, from: &Path, to: &Path) {
         let is_found = after.find(Path::new(&path)).is_ok_and(|other| same(&other));
         Some(if is_found { path } else { file.to_str()?.to_owned() })
     };
-    for (kinds, key, tables) in
-        [(&["obj", "ply", "gltf"][..], "path", "object"), (&["sky"], "map", "light")]
+    for (kinds, key, tables) in [(&["obj", "ply", "gltf"][..], "path", "object"), (&["sky"], "map", "light")]
     {
-        let Some(named) = document.get_mut(tables).and_then(|item| item.as_table_like_mut()) else { continue };
+        let Some(named) = document.get_mut(tables).and_then(|item| item.as_table_like_mut()) else {
+            continue;
+        };
         for (_, item) in named.iter_mut() {
             let Some(table) = item.as_table_like_mut() else { continue };
             for kind in kinds {

@@ -54,7 +54,8 @@ pub(super) fn hash(table: &dyn TableLike) -> String {
                 hasher.update(&(x + 0.0).to_le_bytes());
             }),
             None => {
-                hasher.update(item.as_str().map_or_else(|| item.to_string(), str::to_owned).trim().as_bytes());
+                hasher
+                    .update(item.as_str().map_or_else(|| item.to_string(), str::to_owned).trim().as_bytes());
             }
         }
         hasher.update(b"\n");

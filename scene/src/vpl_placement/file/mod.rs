@@ -171,7 +171,8 @@ fn entries(document: &mut DocumentMut) -> &mut ArrayOfTables {
 
 /// The lines of `[vpls.placed]`.
 fn listed(document: &DocumentMut) -> Vec<String> {
-    let list = document.get("vpls").and_then(|vpls| vpls.get("placed")).and_then(|placed| placed.get("sites"));
+    let list =
+        document.get("vpls").and_then(|vpls| vpls.get("placed")).and_then(|placed| placed.get("sites"));
     let list = list.and_then(Item::as_array).into_iter().flatten();
     list.filter_map(|line| line.as_str().map(str::to_owned)).collect()
 }

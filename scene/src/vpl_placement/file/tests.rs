@@ -75,7 +75,10 @@ fn what_was_there_stays_as_it_was() {
     assert!(text.starts_with(before) && text.ends_with(end));
     let document: DocumentMut = text.parse().unwrap();
     assert_eq!(document["vpl"].as_array_of_tables().unwrap().len(), vpls.len() + 1);
-    assert_eq!(parse(&text).counts, VplFileCounts { by_hand: 1, replaced: vpls.len() as u32, ..Default::default() });
+    assert_eq!(
+        parse(&text).counts,
+        VplFileCounts { by_hand: 1, replaced: vpls.len() as u32, ..Default::default() }
+    );
     // None where the one made by hand stands.
     let middle = glam::Vec3::new(0.0, -1.0, 0.0) - scene().origin_m.as_vec3();
     assert!(vpls.iter().all(|vpl| vpl.position.distance(middle) >= 0.6 || vpl.normal.y < 0.7));
@@ -153,7 +156,8 @@ fn the_hash_is_that_of_the_values() {
 #[test]
 fn inline_tables_are_read_and_settings_kept() {
     let inline = "vpl = [{ position_m = [0, -1, 0], normal = [0, 1, 0], albedo = 0.3 }]\nvpls = { softening_m2 = 0.01 }\n";
-    let (text, vpls) = run(&format!("{inline}{FILE}").replace("[[vpl]] # by hand", "[material.unused]"), &settings());
+    let (text, vpls) =
+        run(&format!("{inline}{FILE}").replace("[[vpl]] # by hand", "[material.unused]"), &settings());
     let document: DocumentMut = text.parse().unwrap();
     assert_eq!(document["vpl"].as_array_of_tables().unwrap().len(), vpls.len() + 1);
     assert_eq!(document["vpls"]["softening_m2"].as_float(), Some(0.01));
