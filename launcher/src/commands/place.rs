@@ -6,7 +6,7 @@ use crate::{
     output::{self, grouped},
 };
 use photonstream_scene::{
-    ModelOptions, ModelScene, Scene, SceneConfig, is_model,
+    ModelOptions, ModelScene, Scene, SceneConfig, SceneError, is_model,
     vpl_placement::{PlacedWeights, VplFile, VplFileCounts, VplPlacement, VplPlacementSettings, place_vpls},
 };
 use serde::Serialize;
@@ -140,7 +140,10 @@ fn settings(args: &Args) -> VplPlacementSettings {
 
 /// The scene, and the file whose VPLs are renewed: `out` where it is there already, else `config`.
 fn opened(config: &Path, out: &Path) -> Result<(Scene, VplFile), LauncherError> {
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(|e| LauncherError::io("read", path, e));
+    let read = |path: &Path| {
+        let failed = |source| SceneError::Read { file: path.to_owned(), source };
+        std::fs::read_to_string(path).map_err(failed)
+    };
     let is_same = out.canonicalize().is_ok_and(|out| config.canonicalize().is_ok_and(|config| out == config));
     if out.exists() && !is_same {
         let text = read(out)?;

@@ -33,6 +33,9 @@ const POINTS: std::ops::RangeInclusive<usize> = 1 << 14..=1 << 17;
 /// How far from a light surface may lie that it stands for, in multiples of the spacing.
 const REACH: f32 = 2.0;
 
+/// How much finer the first grid is in which a reflection is looked for.
+const FINER: f32 = 6.0;
+
 /// Surfaces of other material are shared out as if so much farther away, squared: to a light of their own where there is one.
 const UNLIKE: f32 = 4.0;
 
@@ -47,19 +50,23 @@ pub(super) fn areas(
 ) -> Vec<f32> {
     let surface = Surface::of(scene);
     let count = (POINTS_EACH * shares.len()).clamp(*POINTS.start(), *POINTS.end());
-    let mut grid = Grid::new(spacing_m);
-    (0u32..).zip(reflections).for_each(|(number, at)| grid.insert(at.position, number));
-    let owner = |index: usize| {
-        let point = surface.point(scene, kinds, index, count, sequence.sample(index as u64))?;
-        let nearest = grid
-            .near(point.position)
+    // Most points have a reflection close by; the others look as far as the spacing.
+    let grids = [spacing_m / FINER, spacing_m].map(|edge_m| {
+        let mut grid = Grid::new(edge_m);
+        (0u32..).zip(reflections).for_each(|(number, at)| grid.insert(at.position, number));
+        grid
+    });
+    let nearest_in = |grid: &Grid, point: &Place| {
+        grid.near(point.position)
             .map(|number| &reflections[number as usize])
             .filter(|at| at.normal.dot(point.normal) >= COS_TOGETHER && at.kind.moving == point.kind.moving)
-            .min_by(|a, b| {
-                let distance = |at: &Reflection| at.position.distance_squared(point.position);
-                distance(a).total_cmp(&distance(b))
-            })?;
-        let to = nearest.position - point.position;
+            .map(|at| (at.position.distance_squared(point.position), at.position))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let owner = |index: usize| {
+        let point = surface.point(scene, kinds, index, count, sequence.sample(index as u64))?;
+        let (_, nearest) = grids.iter().find_map(|grid| nearest_in(grid, &point))?;
+        let to = nearest - point.position;
         let is_reached = to.length_squared() < spacing_m * spacing_m
             && !scene.bvh.occluded(&Ray { origin: point.position, direction: to, t_max: 1.0 });
         is_reached.then(|| owner_of(&point, shares, REACH * spacing_m)).flatten()

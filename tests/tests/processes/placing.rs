@@ -80,6 +80,6 @@ fn what_makes_no_sense_is_named() {
         .expect(2, &["depth: found 0, expected a whole number"]);
     ground.run(&place(&scene, "a.toml", &["--from", "1,2"])).expect(2, &["expected three numbers of metres"]);
     ground.run(&place(&scene, "a.glb", &[])).expect(2, &["a.glb is called like a model"]);
-    ground.run(&place("nowhere.toml", "a.toml", &[])).expect(1, &["cannot read nowhere.toml"]);
+    ground.run(&place("nowhere.toml", "a.toml", &[])).expect(3, &["nowhere.toml: cannot be read"]);
     assert!(!ground.path("a.toml").exists());
 }
