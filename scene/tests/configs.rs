@@ -36,9 +36,9 @@ fn every_config_loads_and_resolves_to_itself() {
         }
         count += 1;
         let Some(scene) = load(path.file_name().unwrap().to_str().unwrap()) else { continue };
-        // What the models of others lack cannot be helped here.
+        // What the models of others lack cannot be helped here; skies over scenes of few lights are told to light no VPL.
         let is_known = |n: &&String| {
-            ["have no area", "of its pictures are white", "d is not read"]
+            ["have no area", "of its pictures are white", "d is not read", "the sky lights no VPL"]
                 .iter()
                 .all(|known| !n.contains(known))
         };

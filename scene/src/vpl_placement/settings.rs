@@ -73,7 +73,7 @@ impl VplPlacementSettings {
             Err(VplPlacementError::Setting { name, found: value.to_string(), expected: expected.into() })
         };
         if let Some(spacing) = self.spacing_m {
-            let valid = spacing >= 1e-6 && spacing <= MAX_LENGTH_M;
+            let valid = (1e-6..=MAX_LENGTH_M).contains(&spacing);
             length("spacing_m", spacing, "a length from 1e-6 to 1e9 m", valid)?;
         }
         let valid = self.normal_bias_m.abs() <= MAX_LENGTH_M;
