@@ -141,6 +141,9 @@ impl SceneConfig {
         let anchors = vpls::Anchors { objects: &objects, rest_meshes: &rest_meshes, origin: origin_m };
         let vpls = vpls::read(VplTables::of(&self), &root, streaming.method, &anchors)?;
         vpls.tables.clone().write(&mut self);
+        // For those who edit the file: the scene is the same without.
+        self.vpl.iter_mut().for_each(|vpl| vpl.placed = None);
+        self.vpls.iter_mut().for_each(|vpls| vpls.placed = None);
         let (resolved_text, hash) = resolve(&mut self, &inputs.contents, inputs.sky_content.as_ref());
         let mut scene = Scene {
             name,

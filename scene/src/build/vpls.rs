@@ -58,9 +58,6 @@ pub(crate) fn read(
     if has_tables || method != Method::PhotonStreaming {
         config.vpls.get_or_insert_default();
     }
-    // For those who edit the file: the scene is the same without.
-    config.vpl.iter_mut().for_each(|vpl| vpl.placed = None);
-    config.vpls.iter_mut().for_each(|vpls| vpls.placed = None);
     let settings = match &mut config.vpls {
         Some(vpls) => settings(vpls, !config.proxy.is_empty(), &root.key("vpls"))?,
         None => VplSettings::default(),

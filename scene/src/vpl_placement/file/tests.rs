@@ -211,3 +211,23 @@ sky = { map = \"sky.exr\" }
     assert_eq!(rebased("in/out/y.toml"), expected.replace("out/c.glb", "c.glb"));
     assert_eq!(rebased("other/y.toml"), expected.replace("out/c.glb", &at("in/out/c.glb")));
 }
+
+/// The scene has the VPLs, and nothing of the notes about them; what saves a scene's VPLs into the file keeps those.
+#[test]
+fn a_placed_file_loads() {
+    let (text, placed) = run(FILE, &settings());
+    let scene = |text: &str| {
+        let config = SceneConfig::from_text(text, Path::new("room.toml")).unwrap();
+        config.build_with(&AssetRoots::default()).unwrap()
+    };
+    let whole = scene(&text);
+    assert_eq!(whole.vpls.vpls.len(), placed.len() + 1);
+    // Coordinates are written in millimetres' tenths, weights with three figures.
+    for (vpl, placed) in whole.vpls.vpls[1..].iter().zip(&placed) {
+        assert!((vpl.position - placed.position.as_dvec3()).length() < 1e-4);
+        let area = placed.area_m2.unwrap();
+        assert!((vpl.weight.unwrap() - area).abs() <= 0.005 * area);
+    }
+    assert!(!whole.resolved_text.contains("placed"));
+    assert_eq!(whole.vpls.written_into(&text, Path::new("room.toml")).unwrap(), text);
+}
