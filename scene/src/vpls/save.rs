@@ -80,6 +80,7 @@ fn defaults(has_proxies: bool) -> VplsConfig {
         second_bounce_albedo: widen(settings.second_bounce_albedo),
         second_bounce_distance_m: widen(settings.second_bounce_distance),
         photons: Some(settings.photons),
+        placed: None,
     }
 }
 
