@@ -20,7 +20,7 @@ use glam::Vec3;
 use photonstream_protocol::{
     AccessMode, ControlClient, ProtocolError, Reading, Reply, Request, Subscriber, VslFrame,
 };
-use photonstream_scene::Scene;
+use photonstream_scene::{Method, Scene};
 use serde::Serialize;
 use std::{
     fmt,
@@ -109,7 +109,7 @@ pub fn run(
 ) -> Result<DynamicReport, SimulatorError> {
     let mut scene = scene.clone();
     scene.animation = Arc::default();
-    scene.streaming.adaptive = false;
+    (scene.streaming.adaptive, scene.streaming.method) = (false, Method::PhotonStreaming);
     let simulation = Simulation::new(Arc::new(scene));
     let rays = simulation.fill().counters().rays;
     if rays == 0 {

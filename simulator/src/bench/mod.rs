@@ -14,7 +14,7 @@ pub use parts::Parts;
 pub use report::{BenchReport, Throughput};
 
 use crate::{error::SimulatorError, service, simulation::Simulation};
-use photonstream_scene::Scene;
+use photonstream_scene::{Method, Scene};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -72,10 +72,10 @@ pub fn run(
     Ok(BenchReport::new(&simulation, placement_s, one, all, &parts, exchange))
 }
 
-/// The scene with virtual surface lights that stay where they are placed: measured is light that changes, not lights that move.
+/// The scene lit by photons, with virtual surface lights that stay where they are placed: measured is light that changes, not lights that move.
 fn with_still_lights(scene: &Scene) -> Arc<Scene> {
     let mut scene = Scene::clone(scene);
-    scene.streaming.adaptive = false;
+    (scene.streaming.adaptive, scene.streaming.method) = (false, Method::PhotonStreaming);
     Arc::new(scene)
 }
 
