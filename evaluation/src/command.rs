@@ -35,6 +35,7 @@ pub(crate) fn whole(options: &Options, arguments: &str) -> String {
     };
     add("size", options.size.map(|(width, height)| format!("{width}x{height}")));
     add("spp", options.reference_spp.map(|n| n.to_string()));
+    add("time", options.time_s.map(|t| t.to_string()));
     add("threads", options.threads.map(|n| n.to_string()));
     add("seed", options.seed.map(|n| n.to_string()));
     for point in &options.points {
@@ -43,17 +44,18 @@ pub(crate) fn whole(options: &Options, arguments: &str) -> String {
     with_arguments(command, arguments)
 }
 
-/// One point of `config`, in a picture of so many pixels, against a reference of `spp` paths per pixel.
+/// One point of `config`, at a moment if one is given, in a picture of so many pixels, against a reference of `spp` paths per pixel.
 pub(crate) fn of_point(
-    config: &Path,
+    (config, time_s): (&Path, Option<f64>),
     (width, height): (u32, u32),
     spp: u64,
     point: &Point,
     arguments: &str,
 ) -> String {
     let config = quoted(config);
+    let time = time_s.map_or(String::new(), |t| format!(" --time {t}"));
     let command = format!(
-        "photonstream evaluate {config} --out again --size {width}x{height} --spp {spp} --point {point}"
+        "photonstream evaluate {config} --out again --size {width}x{height} --spp {spp}{time} --point {point}"
     );
     with_arguments(command, if point.method == Method::PhotonStreamingGpu { arguments } else { "" })
 }
@@ -72,6 +74,7 @@ mod tests {
             effort: Effort::Quick,
             size: Some((8, 6)),
             reference_spp: Some(4),
+            time_s: None,
             threads: Some(2),
             seed: Some(7),
             points: vec!["path-tracing:spp=3".into()],

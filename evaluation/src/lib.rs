@@ -9,6 +9,7 @@ mod command;
 pub mod device;
 mod error;
 mod evaluate;
+pub mod figures;
 pub mod flip;
 pub mod hard_cases;
 pub mod machine;

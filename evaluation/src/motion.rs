@@ -95,8 +95,9 @@ pub fn flicker_of(
         Some(method) => Lights::Few(Box::new(FewLights::new(&scene, method))),
         None => Lights::Streamed(Box::new(bench.simulation(point))),
     };
-    // The beginning is often a rest: a third of the way in, something moves.
-    let begin_s = animation.end_s().map_or(1.0, |end| end / 3.0);
+    // Beginning and middle are often rests: a fifth of the way in, something moves.
+    let whole_s = animation.end_s().or(animation.period_s());
+    let begin_s = whole_s.map_or(1.0, |whole| whole / 5.0);
     let mut pictures: Vec<Vec<Vec3>> = Vec::new();
     for frame in 0..frames {
         watch.check()?;

@@ -19,6 +19,7 @@ fn options(out: &Path, points: &[&str]) -> Options {
         effort: Effort::Quick,
         size: Some((24, 24)),
         reference_spp: Some(32),
+        time_s: None,
         threads: Some(2),
         seed: None,
         points: points.iter().map(|&p| p.to_owned()).collect(),

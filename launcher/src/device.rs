@@ -175,6 +175,7 @@ mod tests {
             effort: Effort::Quick,
             size: Some((32, 32)),
             reference_spp: Some(64),
+            time_s: None,
             threads: Some(2),
             seed: None,
             points: points.iter().map(|&p| p.to_owned()).collect(),

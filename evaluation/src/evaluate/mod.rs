@@ -5,6 +5,7 @@ mod run;
 use crate::{
     EvaluateError, command,
     device::{Offered, WITHOUT},
+    figures::figures,
     hard_cases::{CLOSED_FORMS, SAMPLES, run as run_closed_form},
     machine::Machine,
     methods::{Bench, denoised},
@@ -39,6 +40,8 @@ pub struct Options {
     pub size: Option<(u32, u32)>,
     /// Paths per pixel of references; `None`: by effort.
     pub reference_spp: Option<u64>,
+    /// The moment at which animated scenes are measured, s; `None`: as they are loaded.
+    pub time_s: Option<f64>,
     /// Threads; `None`: one per core.
     pub threads: Option<usize>,
     /// Seed of all samples; `None`: the config's.
@@ -128,7 +131,15 @@ fn scene(
     results: &mut Results,
     sheets: &mut Vec<SceneSheet>,
 ) -> Result<(), EvaluateError> {
-    let mut loaded = SceneConfig::from_file(config)?.build()?;
+    let written = SceneConfig::from_file(config)?;
+    let mut loaded = match options.time_s {
+        Some(time_s) => {
+            let mut held = written.at(time_s)?.build()?;
+            held.animation = written.build()?.animation;
+            held
+        }
+        None => written.build()?,
+    };
     // A moving scene is measured as it is loaded, but for its flicker.
     let animation = std::mem::take(&mut loaded.animation);
     loaded.streaming.seed = options.seed.unwrap_or(loaded.streaming.seed);
@@ -163,6 +174,9 @@ fn scene(
         run.point(planned, sheets)?;
     }
     run.methods(&animation)?;
+    if let Some(sheet) = sheets.last_mut() {
+        sheet.figures = figures(&run.bench, &base, &animation, &truth, observer.watch())?;
+    }
     run.path_tracing(&base, sheets)?;
     run.splits(&base)?;
     run.changes(&base)

@@ -162,7 +162,7 @@ impl Run<'_, '_> {
             reference_noise_indirect: truth.noise.indirect,
             at_noise_floor: full.rel_rmse < std::f64::consts::SQRT_2 * truth.noise.full,
             command: command::of_point(
-                self.config,
+                (self.config, self.options.time_s),
                 (width, height),
                 self.spp,
                 point,

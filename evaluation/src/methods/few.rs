@@ -5,7 +5,7 @@ use crate::{
     EvaluateError,
     point::{Method, Point},
 };
-use photonstream_renderer::VslSet;
+use photonstream_renderer::{RenderError, VslSet};
 use photonstream_scene::{Method as SceneMethod, Scene, StreamingSettings, Visibility};
 use photonstream_simulator::{few_lights::FewLights, records};
 use std::sync::Arc;
@@ -60,6 +60,11 @@ pub(crate) fn vsls_of(few: &FewLights) -> Result<VslSet, EvaluateError> {
 /// The lights, their number, and the time that an update takes, ms: the median of several.
 pub(super) fn lights(scene: &Scene, point: &Point) -> Result<(VslSet, usize, f64), EvaluateError> {
     let method = method_of(point.method).expect("invariant: a method of few lights");
+    if !is_possible(scene, point.method) {
+        let (option, found) = ("method", point.method.name().to_owned());
+        let expected = "another one: the scene has no [[vpl]] tables, or no spot";
+        return Err(RenderError::Option { option, found, expected }.into());
+    }
     let scene = with_settings(scene, point);
     let mut few = FewLights::new(&scene, method);
     few.update(&scene, 0.0);

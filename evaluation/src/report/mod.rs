@@ -6,6 +6,7 @@ mod bars;
 mod charts;
 mod choose;
 mod few_lights;
+mod figures;
 mod hard_cases;
 mod page;
 mod portrait;

@@ -1,8 +1,9 @@
 //! Turns measured pictures into those worth showing, side by side with their errors.
 
-use super::{again, escape, figure, series::kind, time};
+use super::{again, escape, figure, figures, series::kind, time};
 use crate::{
     EvaluateError,
+    figures::Figure,
     flip::{Exposure, flip},
     maps::{Picture, flip_picture, mean_luminance, signed_error},
     plan,
@@ -36,6 +37,8 @@ pub struct SceneSheet {
     exposure: Exposure,
     truth: Film,
     portraits: Vec<Portrait>,
+    /// Figures of paper B.
+    pub figures: Vec<Figure>,
 }
 
 /// Most pictures of one scene.
@@ -54,6 +57,7 @@ impl SceneSheet {
             exposure: Exposure { ev: scene.render.exposure_ev, tone_map: scene.render.tone_map },
             truth: truth.film.clone(),
             portraits: Vec::new(),
+            figures: Vec::new(),
         }
     }
 
@@ -81,6 +85,11 @@ impl SceneSheet {
             None if self.portraits.len() < MOST => self.portraits.push(portrait),
             None => {}
         }
+    }
+
+    /// Paper B's figures, remade.
+    pub(super) fn figures_html(&self) -> Result<String, EvaluateError> {
+        figures::part(&self.figures, &self.truth, self.exposure)
     }
 
     /// The reference, and every picture with its errors.
@@ -147,7 +156,7 @@ pub(super) fn settings(row: &Row) -> String {
     parts.join(", ")
 }
 
-fn image(picture: &Picture, alt: &str) -> Result<String, EvaluateError> {
+pub(super) fn image(picture: &Picture, alt: &str) -> Result<String, EvaluateError> {
     let png = picture.png().map_err(|e| EvaluateError::draw(alt, e))?;
     Ok(format!(
         "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",

@@ -63,6 +63,7 @@ pub(super) fn section(results: &Results, sheet: &SceneSheet, index: usize) -> Re
     out.push_str("<h3>Side by side</h3><p>Of each method the picture with the least error in the time that the scene's own \
                   settings take, or its fastest.</p>");
     out.push_str(&sheet.html()?);
+    out.push_str(&sheet.figures_html()?);
     out.push_str(&settings_charts(&rows, sheet)?);
     out.push_str(&accumulation::part(results, &rows));
     out.push_str(&causes(results, sheet)?);

@@ -40,6 +40,9 @@ pub(crate) struct Args {
     /// Paths per pixel of the reference [default: 4096, or 256 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
     spp: Option<u64>,
+    /// Measure animated scenes at this moment, in seconds [default: as they are loaded, at 0]
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<f64>,
     /// Threads [default: one per core]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
@@ -87,6 +90,7 @@ struct Report {
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     let options = Options {
         configs: args.configs.clone(),
+        time_s: args.time,
         out: args.out.clone(),
         cache: args.cache.clone().or_else(user_cache).unwrap_or_else(|| args.out.join("cache")),
         effort: if args.quick { Effort::Quick } else { Effort::Default },
