@@ -54,7 +54,7 @@ pub(crate) fn with_settings(scene: &Scene, point: &Point) -> Scene {
 /// The lights that shine of `few`, in the present state.
 pub(crate) fn vsls_of(few: &FewLights) -> Result<VslSet, EvaluateError> {
     let distances = records::distance_records(&few.distance_maps());
-    Ok(VslSet::from_records(&few.records(0))?.with_distances(&distances))
+    Ok(VslSet::from_records(&few.records(0))?.with_patches(&few.patches()).with_distances(&distances))
 }
 
 /// The lights, their number, and the time that an update takes, ms: the median of several.

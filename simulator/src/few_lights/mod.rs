@@ -12,12 +12,14 @@ mod sources;
 mod tests;
 
 use constellation::Constellation;
+use core::f32::consts::SQRT_2;
 use glam::Vec3;
 use maps::Maps;
 pub(crate) use maps::MapsChanged;
-use photonstream_protocol::VslRecord;
+use photonstream_protocol::{PatchRecord, VslRecord};
 use photonstream_running_light::{Phantom, PhantomSettings, SecondBounce, Spot, VirtualLight, VplId, update};
 use photonstream_scene::{Method, ObjectId, Scene, VplSettings};
+use photonstream_shading::{basis, sampling};
 use sources::Source;
 pub(crate) use sources::{POINTS, is_spot};
 use std::time::Instant;
@@ -143,6 +145,12 @@ impl FewLights {
                 ..VslRecord::default()
             })
             .collect()
+    }
+
+    /// The polygons of the lights of the last update: octagons of their areas, so that kernel `patch` is bounded and exact for
+    /// them, too; none for what does not shine.
+    pub fn patches(&self) -> Vec<PatchRecord> {
+        self.lights.iter().map(|shown| octagon(&shown.light)).collect()
     }
 
     /// The distance maps that have changed since this was asked last; `None` where the scene asks for none.
@@ -295,6 +303,24 @@ pub fn count(scene: &Scene, method: Method) -> usize {
         _ => 0,
     };
     first + second
+}
+
+/// A regular octagon of a light's area around it, counter-clockwise as its lit side sees it.
+fn octagon(light: &VirtualLight) -> PatchRecord {
+    let mut record = PatchRecord::default();
+    // 2√2 R² is its area.
+    let radius = (light.area / (2.0 * SQRT_2)).sqrt();
+    let normal = light.normal.normalize_or(Vec3::Y);
+    if light.flux == Vec3::ZERO || !(radius > 0.0 && radius.is_finite()) {
+        return record;
+    }
+    let (tangent, bitangent) = basis::tangents(normal);
+    for (index, corner) in record.corners.chunks_exact_mut(3).enumerate() {
+        let (sin, cos) = sampling::sin_cos_turn(index as f32 / 8.0);
+        corner.copy_from_slice(&((tangent * cos + bitangent * sin) * radius).to_array());
+    }
+    (record.count, record.area) = (8, light.area);
+    record
 }
 
 /// The settings of the second bounce, if there is to be one.

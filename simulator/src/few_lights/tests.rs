@@ -247,3 +247,20 @@ fn distance_maps_follow_the_lights() {
     assert_eq!(few.take_changed_maps().unwrap().changed.len(), 1);
     assert_eq!(few.distance_maps().len(), 32);
 }
+
+/// The octagon of a light: eight corners in its plane, counter-clockwise, with its area by the shoelace formula. Tolerance:
+/// roundings. What does not shine, or has no area, has none.
+#[test]
+fn polygons_have_the_area_of_their_light() {
+    let light =
+        VirtualLight { position: Vec3::ONE, normal: Vec3::new(0.6, 0.0, -0.8), flux: Vec3::ONE, area: 2.5 };
+    let record = octagon(&light);
+    let corners: Vec<Vec3> = record.corners.chunks_exact(3).map(Vec3::from_slice).collect();
+    let doubled: Vec3 = (0..8).map(|i| corners[i].cross(corners[(i + 1) % 8])).sum();
+    assert!(doubled.abs_diff_eq(light.normal * 5.0, 1e-5), "{doubled}");
+    assert!(corners.iter().all(|corner| corner.dot(light.normal).abs() < 1e-6));
+    assert_eq!((record.count, record.area), (8, 2.5));
+    for none in [VirtualLight { flux: Vec3::ZERO, ..light }, VirtualLight { area: 0.0, ..light }] {
+        assert_eq!(octagon(&none), PatchRecord::default());
+    }
+}

@@ -355,7 +355,10 @@ impl LedgerActor {
             }
         }
         let still = Arc::clone(&progress.still);
-        let patches = progress.patches();
+        let patches = match &progress.few {
+            Some(few) => few.lights.patches().into(),
+            None => progress.patches(),
+        };
         progress.relative_error = records::relative_error(&vsls.records);
         // What goes on by itself has begun to only now.
         let is_at_rest = progress.paused || !progress.is_on_its_way();

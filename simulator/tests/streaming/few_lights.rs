@@ -64,7 +64,9 @@ fn the_first_frame_is_whole_and_edits_are_instant() {
     let frame = frame_where(&mut subscriber, 1, |_| (), |_| true);
     assert_eq!(flux(&frame), expected(&first.scene, Method::StaticVpl));
     assert!(is_converged(&frame) && frame.vsls[0].flux[0] > 0.0 && frame.vsls[1].flux[0] == 0.0);
-    assert_eq!((frame.vsls.len(), frame.patches.len(), frame.statistics.paths_total), (2, 0, 0));
+    assert_eq!((frame.vsls.len(), frame.patches.len(), frame.statistics.paths_total), (2, 2, 0));
+    // An octagon for what shines.
+    assert_eq!([frame.patches[0].count, frame.patches[1].count], [8, 0]);
     let reply = client.request(&torch(json!({ "power_w": 15 })), PATIENCE).unwrap();
     let dimmed = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
     let halved = frame.vsls[0].flux[0] * 0.5;
