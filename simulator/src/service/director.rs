@@ -21,7 +21,6 @@ use crate::{counters::Counters, error::SimulatorError, simulation::Simulation};
 use photonstream_protocol::{ChannelName, ControlServer, Incoming, ProtocolError, Replier, Reply, Request};
 use serde::Serialize;
 use std::{
-    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -123,7 +122,7 @@ struct Director {
     /// Why the animation stood still last.
     animation_error: String,
     /// The file of the scene, if it is one that can be written.
-    config_file: Option<PathBuf>,
+    config_file: Option<saving::ConfigFile>,
     /// Hash of the config that was loaded last.
     loaded_hash: u64,
     news: flume::Receiver<News>,

@@ -180,6 +180,43 @@ fn configs_change_methods_and_take_edits() {
     service.end();
 }
 
+/// Held at a moment, what moves with an object is where it is then: that is not written into a file that says where it is at
+/// the beginning.
+#[test]
+fn held_scenes_are_not_saved_into_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("room.toml");
+    let camera = "[camera]\nposition_m = [0, 0, 5]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n";
+    let moving = "
+        [object.lift]
+        material = \"a\"
+        box = { size_m = [0.2, 0.2, 0.2] }
+        [[vpl]]
+        position_m = [0, 0.1, 0]
+        normal = [0, 1, 0]
+        albedo = 0.5
+        object = \"lift\"
+        [[animation]]
+        object = \"lift\"
+        property = \"position_m\"
+        times_s = [0, 2]
+        values = [[0, 0, 0], [0, 1, 0]]
+    ";
+    let written = format!("{}{camera}{moving}", text("method = \"static-vpl\""));
+    std::fs::write(&file, &written).unwrap();
+    let mut source = ConfigSource::new(&file, Overrides { time: Some(1.0), ..Overrides::default() });
+    let first = Simulation::new(Arc::new(source.load().unwrap()));
+    let options = Options { config: Some(source), threads: Some(1), ..Options::default() };
+    let service = start_with("few-held", &first, options);
+    let mut client = service.connect();
+    match client.request(&Request::SaveVpls {}, PATIENCE).unwrap() {
+        Reply::Error { message, .. } => assert!(message.contains("--time"), "{message}"),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), written);
+    service.end();
+}
+
 /// A phantom goes from floor to wall in frames in between, and comes to rest exactly where the axis ends.
 #[test]
 fn phantoms_go_on_in_frames_of_their_own() {

@@ -1,8 +1,9 @@
 //! Turns what edits have made of VPLs, blockers and proxies into the file that the scene comes from.
 
 use super::Director;
+use crate::service::ConfigSource;
 use photonstream_protocol::Reply;
-use photonstream_scene::{SceneError, is_model};
+use photonstream_scene::{SceneError, VplSet, is_model};
 use std::{
     io,
     path::{Path, PathBuf},
@@ -18,9 +19,24 @@ enum SaveError {
     Scene(#[from] SceneError),
 }
 
-/// The file at `path`, if scenes are written there: a model has no text.
-pub(super) fn writable(path: &Path) -> Option<PathBuf> {
-    (!is_model(path)).then(|| path.to_owned())
+/// The file that edits are saved into.
+pub(super) struct ConfigFile {
+    path: PathBuf,
+    /// Whether the scene is held at a moment, where what moves with objects is not where its file has it.
+    is_held: bool,
+}
+
+/// The file of `source`, if scenes are written there: a model has no text.
+pub(super) fn writable(source: &ConfigSource) -> Option<ConfigFile> {
+    let path = source.path.clone();
+    (!is_model(&path)).then(|| ConfigFile { path, is_held: source.overrides.time.is_some() })
+}
+
+/// Whether anything moves with an object.
+fn has_attached(set: &VplSet) -> bool {
+    set.vpls.iter().any(|vpl| vpl.object.is_some())
+        || set.blockers.iter().any(|blocker| blocker.object.is_some())
+        || set.proxies.iter().any(|proxy| proxy.object.is_some())
 }
 
 impl Director {
@@ -33,7 +49,11 @@ impl Director {
                 format!("this simulation comes from no scene file; {remedy}"),
             );
         };
-        match self.save_into(file) {
+        if file.is_held && has_attached(&self.simulation.scene.vpls) {
+            let reason = "with --time, what moves with objects is not where its file has it; simulate without it to save";
+            return Reply::error("unsupported", reason);
+        }
+        match self.save_into(&file.path) {
             Ok(()) => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
             Err(error @ SaveError::File { .. }) => Reply::error("not-saved", error.to_string()),
             Err(error @ SaveError::Scene(_)) => Reply::error("invalid-value", error.to_string()),

@@ -137,7 +137,7 @@ impl Director {
             scene_name: scene.name.clone(),
             clock: scenes::clock(&scene),
             animated_s: 0.0,
-            config_file: options.config.as_ref().and_then(|source| saving::writable(&source.path)),
+            config_file: options.config.as_ref().and_then(saving::writable),
             loaded_hash: scene.hash,
             animation_error: String::new(),
             news,
