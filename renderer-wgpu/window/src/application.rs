@@ -173,6 +173,7 @@ impl ApplicationHandler<Wake> for Application {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        self.session.send_gizmos();
         for request in self.session.outbox.drain(..) {
             self.commands.send(request);
         }

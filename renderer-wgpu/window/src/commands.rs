@@ -45,9 +45,16 @@ struct Queue {
 }
 
 impl Queue {
-    /// Adds a request; an edit goes into one of the same light or object that still waits, whose values it replaces.
+    /// Adds a request; an edit goes into one of the same light or object, or of VPLs, that still waits, whose values it
+    /// replaces; what is saved is what there was when it was asked for.
     fn push(&mut self, request: Request) {
-        let same = self.waiting.iter_mut().find_map(|waiting| match (waiting, &request) {
+        let saved = self.waiting.iter().rposition(|waiting| matches!(waiting, Request::SaveVpls {}));
+        let after = match request {
+            Request::SetVpls { .. } => saved.map_or(0, |saved| saved + 1),
+            _ => 0,
+        };
+        let same = self.waiting.iter_mut().skip(after).find_map(|waiting| match (waiting, &request) {
+            (Request::SetVpls { values }, Request::SetVpls { .. }) => Some(values),
             (Request::SetLight { name, values }, Request::SetLight { name: other, .. })
             | (Request::MoveObject { name, values }, Request::MoveObject { name: other, .. })
                 if name == other =>
@@ -59,7 +66,9 @@ impl Queue {
         match (same, request) {
             (
                 Some(values),
-                Request::SetLight { values: newer, .. } | Request::MoveObject { values: newer, .. },
+                Request::SetLight { values: newer, .. }
+                | Request::MoveObject { values: newer, .. }
+                | Request::SetVpls { values: newer },
             ) => values.extend(newer),
             (_, request) => self.waiting.push_back(request),
         }
@@ -210,6 +219,14 @@ mod tests {
         queue.push(place_of("box", 1.0));
         queue.push(Request::Step);
         queue.push(Request::Step);
+        let list = |key: &str, i: i32| Request::SetVpls { values: value(key, json!([i])) };
+        for request in
+            [list("vpl", 1), list("blocker", 2), list("vpl", 3), Request::SaveVpls {}, list("vpl", 4)]
+        {
+            queue.push(request);
+        }
+        let mut lists = value("vpl", json!([3]));
+        lists.insert("blocker".into(), json!([2]));
         let mut both = value("enabled", json!(false));
         both.insert("power_w".into(), json!([0.1, 12.5, 3e-7]));
         let expected = [
@@ -219,6 +236,9 @@ mod tests {
             place_of("box", 1.0),
             Request::Step,
             Request::Step,
+            Request::SetVpls { values: lists },
+            Request::SaveVpls {},
+            list("vpl", 4),
         ];
         assert_eq!(queue.waiting, expected);
     }

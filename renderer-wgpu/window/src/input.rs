@@ -34,9 +34,9 @@ impl Application {
             WindowEvent::ModifiersChanged(modifiers) => {
                 let state = modifiers.state();
                 session.motion.set_fast(state.shift_key());
-                session.pointer.control = state.control_key();
-                if session.pointer.shift != state.shift_key() {
-                    session.pointer.shift = state.shift_key();
+                let (shift, control) = (state.shift_key(), state.control_key());
+                if (session.pointer.shift, session.pointer.control) != (shift, control) {
+                    (session.pointer.shift, session.pointer.control) = (shift, control);
                     session.drag();
                 }
             }

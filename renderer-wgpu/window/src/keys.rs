@@ -2,11 +2,13 @@
 
 use crate::{
     choices::{EXPOSURE_MOST, SHOWS},
+    gizmos::Kind,
     navigation::Navigation,
     session::Session,
 };
 use glam::Vec3;
 use photonstream_protocol::Request;
+use std::time::Instant;
 use winit::keyboard::KeyCode;
 
 /// Radians per second that the arrow keys turn the head by.
@@ -15,10 +17,10 @@ const TURN: f32 = 1.2;
 const EXPOSURE_STEP: f32 = 0.25;
 
 /// What keys do, for the help text: key, effect.
-pub(crate) const HELP: [(&str, &str); 18] = [
+pub(crate) const HELP: [(&str, &str); 22] = [
     ("drag left", "circle; on a thing or a light: move it"),
     ("shift + drag", "move it up and down"),
-    ("ctrl + drag", "move walls too"),
+    ("ctrl + drag", "move walls too; gizmos along surfaces"),
     ("drag right", "circle"),
     ("drag middle", "shift the view"),
     ("wheel", "nearer, farther"),
@@ -32,6 +34,10 @@ pub(crate) const HELP: [(&str, &str); 18] = [
     ("+ −", "exposure"),
     ("P, F12", "screenshot: EXR and PNG"),
     ("F11", "full screen"),
+    ("G", "gizmos: VPLs, blockers, proxies, phantoms, second bounces"),
+    ("V, B", "with gizmos: add a VPL, a blocker at the cursor"),
+    ("Delete", "remove the selected gizmo"),
+    ("Ctrl+S", "save VPLs, blockers and proxies in the file that is simulated"),
     ("Tab, F1", "overlay"),
     ("H; Ctrl+Q", "this help; quit"),
 ];
@@ -135,7 +141,15 @@ impl Session {
             KeyCode::KeyP | KeyCode::F12 => self.wants_screenshot = true,
             KeyCode::F11 => self.wants_fullscreen = !self.wants_fullscreen,
             KeyCode::KeyQ if self.pointer.control => self.wants_end = true,
-            KeyCode::Escape if !self.put_back() => {
+            KeyCode::KeyG => {
+                self.shows_gizmos = !self.shows_gizmos;
+                self.placing = None;
+            }
+            KeyCode::KeyV if self.shows_gizmos => self.add_gizmo(Kind::Vpl, Instant::now()),
+            KeyCode::KeyB if self.shows_gizmos => self.add_gizmo(Kind::Blocker, Instant::now()),
+            KeyCode::Delete | KeyCode::Backspace => self.remove_gizmo(Instant::now()),
+            KeyCode::KeyS if self.pointer.control => self.save_gizmos(),
+            KeyCode::Escape if self.placing.take().is_none() && !self.put_back() => {
                 self.selected = None;
                 self.shows_help = false;
             }

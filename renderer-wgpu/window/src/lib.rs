@@ -1,4 +1,5 @@
-//! Turns a running simulation into a window: what the GPU renderer draws, and hands for camera, lights and objects.
+//! Turns a running simulation into a window: what the GPU renderer draws, and hands for camera, lights, objects,
+//! VPLs, blockers and proxies.
 //!
 //! [`run`] opens the window and stays until it is closed. Three threads: the window's own draws and never waits for the
 //! simulator; one follows the channel and wakes the window for news; one talks to the simulator's control socket. While
@@ -15,6 +16,7 @@ mod error;
 mod fault;
 mod flaws;
 mod following;
+mod gizmos;
 mod graphics;
 mod input;
 mod interface;

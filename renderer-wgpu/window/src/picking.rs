@@ -1,6 +1,6 @@
 //! Turns a place in the window into the light or the object that is there.
 
-use crate::navigation::project;
+use crate::{gizmos::Gizmo, navigation::project};
 use glam::Vec3;
 use photonstream_scene::{LightId, ObjectId, Scene, bvh::Ray};
 use photonstream_shading::{Camera, Light, LightShape};
@@ -17,6 +17,8 @@ pub(crate) enum Target {
     Light(LightId),
     /// An object, by its surface.
     Object(ObjectId),
+    /// A VPL, blocker or proxy.
+    Gizmo(Gizmo),
 }
 
 /// What is under the cursor.
@@ -46,14 +48,24 @@ impl Eye<'_> {
     }
 
     /// The light whose icon is under `cursor`, else the nearest surface; `radius` of the icons in pixels, `None` where
-    /// they are not shown.
-    pub(crate) fn pick(&self, scene: &Scene, cursor: [f32; 2], radius: Option<f32>) -> Option<Pick> {
-        radius
-            .and_then(|radius| self.pick_light(scene, cursor, radius))
+    /// they are not shown. A gizmo that is there, at its distance in pixels, comes before surfaces and farther icons.
+    pub(crate) fn pick(
+        &self,
+        scene: &Scene,
+        cursor: [f32; 2],
+        radius: Option<f32>,
+        gizmo: Option<(f32, Pick)>,
+    ) -> Option<Pick> {
+        let light = radius.and_then(|radius| self.pick_light(scene, cursor, radius));
+        light
+            .into_iter()
+            .chain(gizmo)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, pick)| pick)
             .or_else(|| self.pick_object(scene, cursor))
     }
 
-    fn pick_light(&self, scene: &Scene, cursor: [f32; 2], radius: f32) -> Option<Pick> {
+    fn pick_light(&self, scene: &Scene, cursor: [f32; 2], radius: f32) -> Option<(f32, Pick)> {
         let near = (0u32..).zip(&scene.lights).filter_map(|(id, light)| {
             let point = anchor(&light.light)?;
             let [x, y] = project(self.camera, point, self.width, self.height)?;
@@ -61,7 +73,7 @@ impl Eye<'_> {
             let pick = Pick { target: Target::Light(LightId(id)), point };
             (distance <= radius).then_some((distance, pick))
         });
-        near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pick)| pick)
+        near.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     fn pick_object(&self, scene: &Scene, cursor: [f32; 2]) -> Option<Pick> {
@@ -113,6 +125,7 @@ mod tests {
         match pick.unwrap().target {
             Target::Light(id) => format!("light {}", scene.lights[id.0 as usize].name),
             Target::Object(id) => scene.objects[id.0 as usize].name.clone(),
+            Target::Gizmo(gizmo) => gizmo.to_string(),
         }
     }
 
@@ -122,16 +135,16 @@ mod tests {
         let eye = Eye { camera: &scene.camera, width: 600, height: 600 };
         let sphere = scene.objects[scene.object("sphere").unwrap().0 as usize].world_from_rest.translation;
         let at = project(eye.camera, sphere.as_vec3(), 600, 600).unwrap();
-        assert_eq!(name(&scene, eye.pick(&scene, at, None)), "sphere");
+        assert_eq!(name(&scene, eye.pick(&scene, at, None, None)), "sphere");
         let lamp = anchor(&scene.lights[0].light).unwrap();
         let [x, y] = project(eye.camera, lamp, 600, 600).unwrap();
-        assert_eq!(name(&scene, eye.pick(&scene, [x + 5.0, y - 5.0], Some(ICON_POINTS))), "light lamp");
-        let beside = name(&scene, eye.pick(&scene, [x + 5.0, y - 5.0], None));
+        assert_eq!(name(&scene, eye.pick(&scene, [x + 5.0, y - 5.0], Some(ICON_POINTS), None)), "light lamp");
+        let beside = name(&scene, eye.pick(&scene, [x + 5.0, y - 5.0], None, None));
         assert!(beside == "ceiling" || beside == "back-wall", "{beside}");
-        assert_eq!(name(&scene, eye.pick(&scene, [40.0, 300.0], Some(ICON_POINTS))), "left-wall");
+        assert_eq!(name(&scene, eye.pick(&scene, [40.0, 300.0], Some(ICON_POINTS), None)), "left-wall");
         // Beside the room there is nothing.
-        assert_eq!(eye.pick(&scene, [-2000.0, 300.0], Some(ICON_POINTS)), None);
-        let pick = eye.pick(&scene, [300.0, 300.0], None).unwrap();
+        assert_eq!(eye.pick(&scene, [-2000.0, 300.0], Some(ICON_POINTS), None), None);
+        let pick = eye.pick(&scene, [300.0, 300.0], None, None).unwrap();
         assert!((project(eye.camera, pick.point, 600, 600).unwrap()[0] - 300.0).abs() < 0.01);
     }
 

@@ -3,12 +3,14 @@
 use crate::{
     commands::{place_light, place_object},
     dragging::{Along, Hold},
+    gizmos::Gizmo,
     picking::{ICON_POINTS, Pick, Target, is_wall},
     session::Session,
     standing::Standing,
 };
 use core::f32::consts::PI;
-use photonstream_scene::LightId;
+use photonstream_scene::{LightId, vpls::VplTables};
+use std::time::Instant;
 
 /// From this way on, in points, a press is a drag and not a click.
 const CLICK_POINTS: f32 = 4.0;
@@ -31,7 +33,7 @@ pub(crate) struct Pointer {
     gesture: Option<Gesture>,
     /// Shift: things move up and down.
     pub(crate) shift: bool,
-    /// Control: walls are taken hold of too.
+    /// Control: walls are taken hold of too, and gizmos go along surfaces.
     pub(crate) control: bool,
 }
 
@@ -57,6 +59,8 @@ enum Kind {
 enum Thing {
     Light(String),
     Object(String),
+    /// A gizmo, and what all tables were before.
+    Gizmo(Gizmo, Box<VplTables>),
 }
 
 impl Pointer {
@@ -65,9 +69,19 @@ impl Pointer {
         self.gesture = None;
     }
 
+    /// Where the cursor is, in pixels.
+    pub(crate) fn cursor(&self) -> [f32; 2] {
+        self.cursor
+    }
+
     /// Whether a thing is being held.
     pub(crate) fn is_holding(&self) -> bool {
         matches!(&self.gesture, Some(Gesture { kind: Kind::Hold { .. }, .. }))
+    }
+
+    /// Whether a gizmo is being held.
+    pub(crate) fn is_holding_gizmo(&self) -> bool {
+        matches!(&self.gesture, Some(Gesture { kind: Kind::Hold { thing: Thing::Gizmo(..), .. }, .. }))
     }
 }
 
@@ -78,13 +92,22 @@ impl Session {
             return;
         }
         let cursor = self.pointer.cursor;
+        if let Some(kind) = self.placing.take_if(|_| button == Button::Left) {
+            self.add_gizmo(kind, Instant::now());
+            return;
+        }
         let kind = match button {
             Button::Middle => Kind::Pan,
             Button::Right => Kind::Orbit(None),
             Button::Left => {
                 let radius = self.shows_overlay.then_some(ICON_POINTS * self.scale);
-                let pick =
-                    self.eye().zip(self.scene()).and_then(|(eye, scene)| eye.pick(scene, cursor, radius));
+                let gizmo = self
+                    .gizmo_at(cursor)
+                    .map(|(distance, gizmo, point)| (distance, Pick { target: Target::Gizmo(gizmo), point }));
+                let pick = self
+                    .eye()
+                    .zip(self.scene())
+                    .and_then(|(eye, scene)| eye.pick(scene, cursor, radius, gizmo));
                 match pick.and_then(|pick| self.take_hold(&pick)) {
                     Some(kind) => {
                         self.select(pick.map(|p| p.target));
@@ -107,6 +130,10 @@ impl Session {
                 (Thing::Object(name), start_m)
             }
             Target::Light(id) => held_light(scene, standing, id)?,
+            Target::Gizmo(gizmo) => {
+                let (_, place) = self.gizmo_place(gizmo)?;
+                (Thing::Gizmo(gizmo, Box::new(self.gizmos.tables().clone())), place)
+            }
         };
         Some(Kind::Hold { hold: Hold::new(pick.point, self.pointer.cursor, start_m), thing })
     }
@@ -142,13 +169,18 @@ impl Session {
         };
         let Some((eye, navigation)) = self.eye().zip(self.navigation.as_ref()) else { return };
         let along = if self.pointer.shift { Along::Vertical(navigation.vertical()) } else { Along::Screen };
-        if let Some(position_m) = hold.position_m(&eye, self.pointer.cursor, along) {
-            let request = match thing {
-                Thing::Light(name) => place_light(name, position_m),
-                Thing::Object(name) => place_object(name, position_m),
-            };
-            self.outbox.push(request);
-        }
+        let (hold, cursor) = (*hold, self.pointer.cursor);
+        let place = hold.position_m(&eye, cursor, along);
+        let request = match (thing, place) {
+            (Thing::Gizmo(gizmo, _), _) => {
+                let (gizmo, along) = (*gizmo, (!self.pointer.control).then_some(along));
+                return self.drag_gizmo(gizmo, &hold, cursor, along);
+            }
+            (Thing::Light(name), Some(position_m)) => place_light(name, position_m),
+            (Thing::Object(name), Some(position_m)) => place_object(name, position_m),
+            (_, None) => return,
+        };
+        self.outbox.push(request);
     }
 
     /// A button was released.
@@ -167,10 +199,11 @@ impl Session {
     pub(crate) fn put_back(&mut self) -> bool {
         match self.pointer.gesture.take() {
             Some(Gesture { kind: Kind::Hold { hold, thing }, is_drag: true, .. }) => {
-                self.outbox.push(match thing {
-                    Thing::Light(name) => place_light(&name, hold.start_m()),
-                    Thing::Object(name) => place_object(&name, hold.start_m()),
-                });
+                match thing {
+                    Thing::Light(name) => self.outbox.push(place_light(&name, hold.start_m())),
+                    Thing::Object(name) => self.outbox.push(place_object(&name, hold.start_m())),
+                    Thing::Gizmo(_, before) => self.change_gizmos(Instant::now(), |tables| *tables = *before),
+                }
                 true
             }
             other => {

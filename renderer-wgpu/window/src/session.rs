@@ -6,6 +6,7 @@ use crate::{
     commands::Told,
     flaws::Flaws,
     following::{Connection, News, Published},
+    gizmos::{Edits, Gizmo, Kind},
     keys::Motion,
     latency::Latency,
     navigation::Navigation,
@@ -30,6 +31,8 @@ pub(crate) enum Selected {
     Light(String),
     /// An object.
     Object(String),
+    /// A VPL, blocker or proxy.
+    Gizmo(Gizmo),
 }
 
 /// What the last picture took.
@@ -56,6 +59,11 @@ pub(crate) struct Session {
     good_choices: Option<Choices>,
     pub(crate) selected: Option<Selected>,
     pub(crate) draft: Draft,
+    /// VPLs, blockers and proxies as they are edited.
+    pub(crate) gizmos: Edits,
+    pub(crate) shows_gizmos: bool,
+    /// What the next click adds.
+    pub(crate) placing: Option<Kind>,
     pub(crate) shows_overlay: bool,
     pub(crate) shows_help: bool,
     pub(crate) notices: Notices,
@@ -98,6 +106,9 @@ impl Session {
             good_choices: None,
             selected: None,
             draft: Draft::default(),
+            gizmos: Edits::default(),
+            shows_gizmos: false,
+            placing: None,
             shows_overlay: true,
             shows_help: false,
             notices: Notices::default(),
@@ -147,24 +158,45 @@ impl Session {
                     .for_each(|choices| choices.ease(&self.args, has_maps, frame.vsls.len()));
             }
         }
+        if self.gizmos.follow(&published) && self.pointer.is_holding_gizmo() {
+            self.pointer.let_go();
+        }
+        self.published = Some(published);
+        self.deselect_what_is_gone();
+    }
+
+    fn deselect_what_is_gone(&mut self) {
+        let Some(scene) = self.scene() else { return };
         let is_gone = match &self.selected {
             Some(Selected::Light(name)) => scene.light(name).is_none(),
             Some(Selected::Object(name)) => scene.object(name).is_none(),
+            Some(Selected::Gizmo(gizmo)) => !self.gizmos.has(*gizmo),
             None => false,
         };
         if is_gone {
             self.selected = None;
             self.pointer.let_go();
         }
-        self.published = Some(published);
     }
 
     /// Takes in what became of a request.
     pub(crate) fn hear(&mut self, told: &Told, now: Instant) {
         match told {
+            Told::Done { request: Request::SetVpls { values }, .. } => {
+                if let Some(published) = self.published.clone() {
+                    self.gizmos.accept(&published.scene, values);
+                }
+            }
+            Told::Done { request: Request::SaveVpls {}, .. } => {
+                self.notices.say("VPLs, blockers and proxies are saved in the file that is simulated", now);
+            }
             Told::Done { .. } => {}
             Told::Failed { request, reason } => {
                 self.notices.warn(format!("{}: {reason}", title(request)), now);
+                if let (Request::SetVpls { .. }, Some(published)) = (request, self.published.clone()) {
+                    self.gizmos.refuse(&published.scene);
+                    self.deselect_what_is_gone();
+                }
             }
         }
     }
@@ -223,6 +255,7 @@ impl Session {
             Target::Object(ObjectId(id)) => {
                 scene.objects.get(id as usize).map(|o| Selected::Object(o.name.clone()))
             }
+            Target::Gizmo(gizmo) => Some(Selected::Gizmo(gizmo)),
         });
     }
 
@@ -259,6 +292,8 @@ fn title(request: &Request) -> String {
     match request {
         Request::SetLight { name, .. } => format!("light \"{name}\" not changed"),
         Request::MoveObject { name, .. } => format!("object \"{name}\" not moved"),
+        Request::SetVpls { .. } => "VPLs, blockers or proxies not changed".into(),
+        Request::SaveVpls {} => "VPLs, blockers and proxies not saved".into(),
         Request::Pause => "not paused".into(),
         Request::Resume => "not resumed".into(),
         Request::Step => "no step made".into(),

@@ -10,6 +10,8 @@ use std::path::Path;
 pub(crate) struct Standing {
     /// By object: its name for edits, and the middle of its rest space seen from its own origin.
     objects: Vec<(String, DVec3)>,
+    /// By object: where the scene's text puts it, as [`Scene::world_from_loaded`].
+    loaded: Vec<DAffine3>,
 }
 
 impl Standing {
@@ -32,7 +34,8 @@ impl Standing {
             let DAffine3 { matrix3, translation } = object.world_from_rest;
             (name.to_owned(), matrix3.transpose() * (translation - (written - scene.origin_m)))
         });
-        Self { objects: objects.collect() }
+        let loaded = (0u32..).zip(&scene.objects).map(|(id, _)| scene.world_from_loaded(ObjectId(id)));
+        Self { objects: objects.collect(), loaded: loaded.collect() }
     }
 
     /// The name by which an object is moved, and its `position_m` now.
@@ -40,6 +43,11 @@ impl Standing {
         let (name, centre) = self.objects.get(id.0 as usize)?;
         let DAffine3 { matrix3, translation } = scene.objects.get(id.0 as usize)?.world_from_rest;
         Some((name.clone(), translation - matrix3 * *centre + scene.origin_m))
+    }
+
+    /// Where the scene's text puts an object, as [`Scene::world_from_loaded`].
+    pub(crate) fn loaded(&self, id: ObjectId) -> Option<DAffine3> {
+        self.loaded.get(id.0 as usize).copied()
     }
 
     /// The `position_m` of a light without a surface; `None` for others, which stand where their objects do.

@@ -1,6 +1,8 @@
 //! Turns the window's state into an interface over the picture, and the user's hands on it into changes.
 
 mod banner;
+mod gizmo_values;
+mod gizmos;
 mod help;
 mod icons;
 mod panel;
@@ -25,6 +27,7 @@ pub(crate) struct Machine {
 /// Shows everything; what was asked for is in the session afterwards.
 pub(crate) fn show(ui: &mut Ui, session: &mut Session, machine: &Machine, now: Instant) {
     let ctx = ui.ctx().clone();
+    gizmos::show(&ctx, session);
     if session.shows_overlay {
         icons::show(&ctx, session);
         panel::show(&ctx, session);

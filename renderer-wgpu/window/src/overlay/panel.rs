@@ -3,6 +3,7 @@
 use super::window;
 use crate::{
     choices::{Choices, EXPOSURE_MOST, SHOWS, show_name},
+    gizmos::Kind,
     session::Session,
 };
 use egui::{ComboBox, Context, Grid, Slider, SliderClamping, Ui, pos2};
@@ -36,8 +37,38 @@ pub(super) fn show(ctx: &Context, session: &mut Session) {
             {
                 navigation.reset();
             }
+            gizmos(ui, session);
         }
     });
+}
+
+/// The switch of the gizmos, and what can be done with all of them.
+fn gizmos(ui: &mut Ui, session: &mut Session) {
+    let set = session.gizmos.set();
+    let counts = [set.vpls.len(), set.blockers.len(), set.proxies.len()];
+    if ui.checkbox(&mut session.shows_gizmos, "gizmos of VPLs").changed() {
+        session.placing = None;
+    }
+    if !session.shows_gizmos {
+        return;
+    }
+    for (kind, count) in Kind::ALL.into_iter().zip(counts) {
+        ui.horizontal(|ui| {
+            let is_next = session.placing == Some(kind);
+            if ui.add(egui::Button::new("Add").selected(is_next)).clicked() {
+                session.placing = (!is_next).then_some(kind);
+            }
+            let name = match kind {
+                Kind::Vpl => "VPLs",
+                Kind::Blocker => "blockers",
+                Kind::Proxy => "proxies",
+            };
+            ui.label(if is_next { "click on a surface".into() } else { format!("{count} {name}") });
+        });
+    }
+    if ui.button("Save in the scene's file").clicked() {
+        session.save_gizmos();
+    }
 }
 
 fn switches(ui: &mut Ui, choices: &mut Choices, scene: &Scene) {

@@ -1,6 +1,6 @@
 //! Turns the selected light or object into sliders, and their motion into requests.
 
-use super::window;
+use super::{gizmo_values, window};
 use crate::{
     commands::{place_light, place_object, power_light, switch_light},
     following::Published,
@@ -41,6 +41,7 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
     let title = match &selected {
         Selected::Light(name) => format!("Light {name}"),
         Selected::Object(name) => format!("Object {name}"),
+        Selected::Gizmo(gizmo) => gizmo.to_string(),
     };
     let place = pos2(8.0, ctx.content_rect().bottom() - 8.0);
     let mut requests = Vec::new();
@@ -52,12 +53,13 @@ pub(super) fn show(ctx: &Context, session: &mut Session, now: Instant) {
     frame.show(ctx, |ui| {
         ui.strong(title);
         match &selected {
-            Selected::Light(name) => light(ui, name, &published, draft, &mut requests),
-            Selected::Object(name) => object(ui, name, &published, draft, &mut requests),
+            Selected::Light(name) => light(ui, name, &published, &mut session.draft, &mut requests),
+            Selected::Object(name) => object(ui, name, &published, &mut session.draft, &mut requests),
+            Selected::Gizmo(gizmo) => gizmo_values::show(ui, session, *gizmo, &published, now),
         }
     });
     if !requests.is_empty() {
-        draft.touched = Some(now);
+        session.draft.touched = Some(now);
         ctx.request_repaint_after(KEPT);
     }
     session.outbox.extend(requests);
@@ -84,6 +86,8 @@ impl Draft {
                 let id = scene.object(name);
                 self.position_m = id.and_then(|id| Some(standing.object(scene, id)?.1));
             }
+            // Its values are those of the tables.
+            Selected::Gizmo(_) => {}
         }
     }
 }
@@ -160,7 +164,7 @@ fn place(ui: &mut Ui, published: &Published, id: ObjectId, draft: &mut Draft, re
 }
 
 /// Three numbers that can be dragged; whether one has changed.
-fn position(ui: &mut Ui, position_m: &mut DVec3) -> bool {
+pub(super) fn position(ui: &mut Ui, position_m: &mut DVec3) -> bool {
     let changed = ui.horizontal(|ui| {
         let mut changed = false;
         for value in [&mut position_m.x, &mut position_m.y, &mut position_m.z] {

@@ -6,7 +6,7 @@ mod simulator;
 mod window;
 
 use display::Display;
-use glam::Vec3;
+use glam::{Vec3, Vec3Swizzles};
 use photonstream_film::Film;
 use photonstream_protocol::VslFrame;
 use photonstream_renderer::{LayerKind, published::PublishedScene};
@@ -250,6 +250,57 @@ fn a_minimised_window_draws_nothing_and_catches_up() {
         window.rest(&mut simulator);
         compare(&mut window, &mut simulator, &mut renderer, LayerKind::Full);
     }
+    window.terminate();
+    window.expect_end();
+}
+
+/// A VPL is put on the floor, dragged to the right, given a blocker beside it and saved; then it is taken away. The simulator
+/// lights what the hands make at once, and the file has what was saved.
+#[test]
+fn vpls_are_added_moved_saved_and_removed_by_hand() {
+    let Some((display, _)) = ready() else { return };
+    let more = "\n[streaming]\nmethod = \"static-vpl\"\n\n# Mine.\n[[vpl]]\nposition_m = [0.0, 2.0, 0.0]\n\
+                normal = [0, -1, 0]\nalbedo = 0.75\n";
+    let mut simulator = Simulator::start_file("gizmos", more);
+    let mut window = Window::open(&display, simulator.channel(), SIZE, &["--visibility", "none"]);
+    // The keyboard is the window's before the first key goes down.
+    window.focus();
+    window.rest(&mut simulator);
+    let (camera, origin) = (simulator.scene().camera, simulator.scene().origin_m.as_vec3());
+    let place = |config_m: [f32; 3]| window::on_screen(&camera, Vec3::from(config_m) - origin, SIZE);
+
+    window.key("Tab");
+    window.key("g");
+    window.point(place([-0.5, 0.0, 0.7]));
+    window.key("v");
+    window.wait("another VPL", |_| simulator.newest().vsls.len() == 2);
+    let added = Vec3::from(simulator.newest().vsls[1].position) + origin;
+    // A pixel of the floor is a few centimetres.
+    assert!(added.distance(Vec3::new(-0.5, 0.0, 0.7)) < 0.06 && added.y.abs() < 1e-4, "{added}");
+
+    // Parallel to the screen, it goes to the right.
+    let from = window::on_screen(&camera, added - origin, SIZE);
+    window.drag(from, (from.0 + 40, from.1), 1);
+    let x = |simulator: &mut Simulator| simulator.newest().vsls[1].position[0] + origin.x;
+    window.wait("it elsewhere", |_| x(&mut simulator) > added.x + 0.3);
+    let moved = Vec3::from(simulator.newest().vsls[1].position) + origin;
+    assert!((moved - added).yz().length() < 1e-4, "{moved}");
+
+    window.point(place([0.0, 0.0, 0.8]));
+    window.key("b");
+    let generation = simulator.newest().config_generation;
+    window.key("ctrl+s");
+    window.wait("word of what was saved", |window| window.said("are saved in the file"));
+    let text = simulator.text();
+    assert!(text.contains("# Mine.") && text.contains("position_m = [0.0, 2.0, 0.0]"), "{text}");
+    assert_eq!((text.matches("[[vpl]]").count(), text.matches("[[blocker]]").count()), (2, 1), "{text}");
+
+    // The file that was saved is simulated now. What is clicked on is removed.
+    window.wait("the saved file", |_| simulator.newest().config_generation > generation);
+    let from = window::on_screen(&camera, moved - origin, SIZE);
+    window.drag(from, from, 1);
+    window.key("Delete");
+    window.wait("one VPL less", |_| simulator.newest().vsls.len() == 1);
     window.terminate();
     window.expect_end();
 }

@@ -4,7 +4,8 @@ use glam::{DAffine3, DVec3};
 use photonstream_protocol::{AccessMode, ChannelName, Liveness, Subscriber, VslFrame};
 use photonstream_scene::{Scene, SceneConfig};
 use photonstream_simulator::{
-    service::{self, Options},
+    cli::Overrides,
+    service::{self, ConfigSource, Options},
     simulation::Simulation,
 };
 use std::{path::Path, sync::Arc, thread::JoinHandle, time::Duration};
@@ -15,6 +16,13 @@ pub(crate) struct Simulator {
     scene: Arc<Scene>,
     running: Option<(std::sync::mpsc::Sender<()>, JoinHandle<()>)>,
     subscriber: Subscriber,
+    config: Option<Config>,
+}
+
+/// A file that is simulated, and the folder that goes with the test.
+struct Config {
+    source: ConfigSource,
+    _folder: tempfile::TempDir,
 }
 
 impl Simulator {
@@ -23,12 +31,33 @@ impl Simulator {
         let mut config = SceneConfig::from_file(&path).unwrap();
         config.streaming.vsls = Some(200);
         config.streaming.pool_paths = Some(4096);
-        let scene = Arc::new(config.build().unwrap());
+        Self::of(name, config.build().unwrap(), None)
+    }
+
+    /// The box with `more` in its file, which is simulated where it lies.
+    pub(crate) fn start_file(name: &str, more: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/cornell-box.toml");
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("box.toml");
+        std::fs::write(&file, std::fs::read_to_string(path).unwrap() + more).unwrap();
+        let mut source = ConfigSource::new(&file, Overrides::default());
+        let scene = source.load().unwrap();
+        Self::of(name, scene, Some(Config { source, _folder: folder }))
+    }
+
+    fn of(name: &str, scene: Scene, config: Option<Config>) -> Self {
+        let scene = Arc::new(scene);
         let channel: ChannelName = format!("window-{name}-{}", std::process::id()).parse().unwrap();
-        let running = Some(run(&scene, &channel));
+        let running = Some(run(&scene, &channel, config.as_ref()));
         let forever = Duration::from_secs(60);
         let subscriber = Subscriber::attach_wait(&channel, AccessMode::Mapped, forever, &|| false).unwrap();
-        Self { channel, scene, running, subscriber }
+        Self { channel, scene, running, subscriber, config }
+    }
+
+    /// What the file that is simulated says.
+    pub(crate) fn text(&self) -> String {
+        let Some(config) = &self.config else { panic!("there is no file") };
+        std::fs::read_to_string(&config.source.path).unwrap()
     }
 
     pub(crate) fn channel(&self) -> &ChannelName {
@@ -70,7 +99,7 @@ impl Simulator {
     pub(crate) fn restart(&mut self) {
         self.stop();
         std::thread::sleep(Duration::from_millis(300));
-        self.running = Some(run(&self.scene, &self.channel));
+        self.running = Some(run(&self.scene, &self.channel, self.config.as_ref()));
     }
 
     fn stop(&mut self) {
@@ -91,8 +120,13 @@ impl Drop for Simulator {
     }
 }
 
-fn run(scene: &Arc<Scene>, channel: &ChannelName) -> (std::sync::mpsc::Sender<()>, JoinHandle<()>) {
+fn run(
+    scene: &Arc<Scene>,
+    channel: &ChannelName,
+    config: Option<&Config>,
+) -> (std::sync::mpsc::Sender<()>, JoinHandle<()>) {
     let (scene, channel) = (Arc::clone(scene), channel.clone());
+    let config = config.map(|config| config.source.clone());
     let (stop, stopped) = std::sync::mpsc::channel();
     let thread = std::thread::spawn(move || {
         let (sender, receiver) = flume::bounded(1);
@@ -101,7 +135,7 @@ fn run(scene: &Arc<Scene>, channel: &ChannelName) -> (std::sync::mpsc::Sender<()
             let _ = stopped.recv();
             let _ = sender.send(());
         });
-        let options = Options { channel, threads: Some(1), ..Options::default() };
+        let options = Options { channel, threads: Some(1), config, ..Options::default() };
         service::run(Simulation::new(scene), &options, &receiver).unwrap();
         bridge.join().unwrap();
     });

@@ -123,6 +123,12 @@ impl<'a> Window<'a> {
         self.display.hands(&["keyup", key]);
     }
 
+    /// Puts the cursor at a place of the window.
+    pub(crate) fn point(&mut self, (x, y): (i32, i32)) {
+        let id = self.id();
+        self.display.hands(&["mousemove", "--window", &id, &x.to_string(), &y.to_string()]);
+    }
+
     /// Presses a button at one place of the window and releases it at another, in eight steps.
     pub(crate) fn drag(&mut self, from: (i32, i32), to: (i32, i32), button: u32) {
         let (id, button) = (self.id(), button.to_string());
