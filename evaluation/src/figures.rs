@@ -46,14 +46,14 @@ const SECOND_BOUNCE_M: f32 = 1.0;
 /// The photons of paper B's figure 12.
 const PHOTONS: [u32; 3] = [1, 20, 200];
 
-/// All figures of a scene; none without predefined VPLs.
+/// All figures of a scene, whose reference is of the moment `reference_s`; none without predefined VPLs.
 ///
 /// # Errors
 /// Those of the renderer, and of animations that cannot be followed.
 pub fn figures(
     bench: &Bench,
     base: &Point,
-    animation: &Animation,
+    (animation, reference_s): (&Animation, f64),
     truth: &Truth,
     watch: Watch<'_>,
 ) -> Result<Vec<Figure>, EvaluateError> {
@@ -100,19 +100,19 @@ pub fn figures(
             ],
         );
     }
-    if let Some(end_s) = animation
-        .end_s()
-        .or(animation.period_s())
-        .filter(|_| scene.vpls.blockers.iter().any(|b| b.object.is_some()))
-    {
+    let moves = !animation.is_empty() && scene.vpls.blockers.iter().any(|b| b.object.is_some());
+    if let Some(end_s) = animation.end_s().or(animation.period_s()).filter(|_| moves) {
         let shots = MOMENTS.map(|share| {
             let time_s = share * end_s / 3.0;
             let mut edit = scene.edit();
             animation.apply(time_s, &mut edit)?;
             let shot =
                 studio.shot(&format!("at {time_s:.1} s"), &point(Method::StaticVpl), &edit.finish())?;
-            // The reference is of the beginning.
-            Ok::<_, EvaluateError>(FigureShot { errors: shot.errors.filter(|_| time_s == 0.0), ..shot })
+            // The reference is of one moment.
+            Ok::<_, EvaluateError>(FigureShot {
+                errors: shot.errors.filter(|_| time_s == reference_s),
+                ..shot
+            })
         });
         add("Figure 10: blockers that move", shots.into_iter().collect::<Result<_, _>>()?);
     }
@@ -183,7 +183,7 @@ mod tests {
         let truth = truth(&scene, (32, 24), 16, folder.path(), Watch::default()).unwrap();
         let bench = Bench::new(Arc::clone(&scene), (32, 24));
         let base = Point::of_scene(&scene, 1);
-        let figures = figures(&bench, &base, &animation, &truth, Watch::default()).unwrap();
+        let figures = figures(&bench, &base, (&animation, 0.0), &truth, Watch::default()).unwrap();
         let titles: Vec<_> = figures.iter().map(|f| f.title.split(':').next().unwrap()).collect();
         assert_eq!(titles, ["Figure 4", "Figure 5", "Figure 6", "Figure 10", "Figure 12"]);
         let door = &figures[3].shots;

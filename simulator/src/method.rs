@@ -45,7 +45,8 @@ pub fn choose(scene: &Scene) -> Choice {
         return chosen(Method::PhotonStreaming, vec![reason]);
     };
     let are_spots = !scene.lights.is_empty() && scene.lights.iter().all(few_lights::is_spot);
-    let order: &[Method] = match (scene.vpls.vpls.is_empty(), are_spots) {
+    let has_sky = scene.sky.is_some();
+    let order: &[Method] = match (scene.vpls.vpls.is_empty() || has_sky, are_spots) {
         (true, _) => &[Method::PhotonStreaming, Method::InstantRadiosity],
         (false, true) => &[Method::PhotonStreaming, Method::PhantomVpl, Method::StaticVpl],
         (false, false) => &[Method::PhotonStreaming, Method::StaticVpl, Method::PhantomVpl],
@@ -53,6 +54,9 @@ pub fn choose(scene: &Scene) -> Choice {
     let mut reasons = Vec::new();
     if scene.vpls.vpls.is_empty() {
         reasons.push("no [[vpl]] tables: static-vpl and phantom-vpl have nothing to light".to_owned());
+    }
+    if has_sky && !scene.vpls.vpls.is_empty() {
+        reasons.push("a sky: it lights no VPL".to_owned());
     }
     let mut fastest = (f64::INFINITY, order[0]);
     for &method in order {

@@ -229,5 +229,8 @@ impl Simulation {
 
 /// Whether two versions of a scene have the same virtual surface lights: [`Simulation::has_lights_of`].
 pub(crate) fn have_same_lights(a: &Scene, b: &Scene) -> bool {
-    Arc::ptr_eq(&a.geometry.rest_vertices, &b.geometry.rest_vertices) && a.streaming == b.streaming
+    let are_like =
+        Arc::ptr_eq(&a.geometry.rest_vertices, &b.geometry.rest_vertices) && a.streaming == b.streaming;
+    // Edits of VPLs may leave `auto` another choice.
+    are_like && (a.streaming.method != Method::Auto || choose(a).method == choose(b).method)
 }

@@ -175,7 +175,13 @@ fn scene(
     }
     run.methods(&animation)?;
     if let Some(sheet) = sheets.last_mut() {
-        sheet.figures = figures(&run.bench, &base, &animation, &truth, observer.watch())?;
+        sheet.figures = figures(
+            &run.bench,
+            &base,
+            (&animation, options.time_s.unwrap_or(0.0)),
+            &truth,
+            observer.watch(),
+        )?;
     }
     run.path_tracing(&base, sheets)?;
     run.splits(&base)?;

@@ -15,6 +15,9 @@ use glam::{DAffine3, DVec3};
 /// Most photons of instant radiosity, and most VPLs: for more there is photon streaming.
 const MOST_LIGHTS: u32 = 100_000;
 
+/// Most VPLs whose weights are computed, in a tenth of a second.
+const MOST_COMPARED: usize = 10_000;
+
 /// A scene's objects as loaded, and where the scene's space lies.
 pub(crate) struct Anchors<'a> {
     pub(crate) objects: &'a [Object],
@@ -109,6 +112,14 @@ fn check(set: &VplSet, method: Method, root: &Field<'_>) -> Result<(), SceneErro
             expected,
             "leave some out, or use method photon-streaming",
         ));
+    }
+    let unweighted = set.vpls.iter().filter(|vpl| vpl.weight.is_none()).count();
+    if unweighted > 0 && vpls > MOST_COMPARED {
+        let expected = format!(
+            "weights where there are more than {MOST_COMPARED}: all are compared with all for the others"
+        );
+        let remedy = "give each a weight, as `photonstream place` does";
+        return Err(root.key("vpl").invalid(format!("{unweighted} without a weight"), expected, remedy));
     }
     if vpls == 0 && matches!(method, Method::StaticVpl | Method::PhantomVpl) {
         return Err(root.key("streaming").key("method").invalid(

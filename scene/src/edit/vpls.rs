@@ -6,6 +6,7 @@ use crate::{
     config::{Document, Field, VplsConfig},
     error::SceneError,
     scene::Scene,
+    settings::PhantomSurfaces,
 };
 use serde_json::Value;
 use std::sync::Arc;
@@ -18,6 +19,14 @@ pub(super) fn set(scene: &mut Scene, values: &Values) -> Result<(), SceneError> 
     let root = Field::root(&document);
     let mut keys = Keys::read(values, None, &KEYS, &root)?;
     let mut tables = scene.vpls.tables.clone();
+    let surfaces =
+        |has_proxies: bool| if has_proxies { PhantomSurfaces::Proxies } else { PhantomSurfaces::Scene };
+    if let Some(vpls) = &mut tables.vpls
+        && vpls.phantom_surfaces == Some(surfaces(!tables.proxy.is_empty()))
+    {
+        // The default goes with the proxies that come or go.
+        vpls.phantom_surfaces = None;
+    }
     if let Some(given) = keys.take::<Values>("vpls", "a table of settings", &root)? {
         tables.vpls = Some(merged(tables.vpls.unwrap_or_default(), given, &root.key("vpls"))?);
     }

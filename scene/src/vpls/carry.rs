@@ -2,7 +2,7 @@
 
 use super::{Proxy, moved_normal};
 use crate::{SceneConfig, SceneError, config::Vector, scene::Scene};
-use glam::{DMat3, EulerRot};
+use glam::{DAffine3, DMat3, DVec3, EulerRot};
 
 impl SceneConfig {
     /// Whether a VPL, blocker or proxy is attached to an object.
@@ -49,14 +49,16 @@ impl SceneConfig {
 
 impl Scene {
     /// The rigid map from a proxy's own space to the scene's, m: a proxy keeps its size, whatever that of its object.
-    pub fn world_from_proxy(&self, proxy: &Proxy) -> glam::DAffine3 {
-        let mut map = self.world_from_anchor(proxy.object) * proxy.anchor_from_own;
-        let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
-        map.matrix3 = DMat3::from_cols(
-            x.normalize_or(glam::DVec3::X),
-            y.normalize_or(glam::DVec3::Y),
-            z.normalize_or(glam::DVec3::Z),
-        );
-        map
+    pub fn world_from_proxy(&self, proxy: &Proxy) -> DAffine3 {
+        let map = self.world_from_anchor(proxy.object);
+        let translation = map.transform_point3(proxy.anchor_from_own.translation);
+        // The axes are orthogonal: without their lengths, and without a mirroring, they turn.
+        let [x, y, z] =
+            [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(DVec3::try_normalize);
+        let turn = match (x, y, z) {
+            (Some(x), Some(y), Some(z)) => DMat3::from_cols(x, y, z * x.cross(y).dot(z).signum()),
+            _ => DMat3::IDENTITY,
+        };
+        DAffine3 { matrix3: turn * proxy.anchor_from_own.matrix3, translation }
     }
 }

@@ -117,6 +117,34 @@ mod tests {
         assert_eq!(sphere.intersect(DVec3::X * 10.0, DVec3::ZERO), None);
     }
 
+    /// A proxy rides with its object, turned and moved, but neither stretched nor mirrored with it.
+    #[test]
+    fn proxies_ride_rigidly() {
+        let text = r#"
+            origin_m = [0, 0, 0]
+            camera = { position_m = [0, 1, 9], target_m = [0, 1, 0], vertical_fov_deg = 40 }
+            material.m.albedo = 0.5
+            object.crate = { material = "m", box = { size_m = [1, 1, 1] } }
+            proxy = [{ object = "crate", position_m = [1, 0, 0], rotation_deg = [0, 0, 30], box = { size_m = [1, 2, 3] } }]
+        "#;
+        let scene =
+            crate::SceneConfig::from_text(text, std::path::Path::new("a.toml")).unwrap().build().unwrap();
+        for scale in [[1.0, 1.0, 1.0], [2.0, 0.5, 1.0], [-2.0, 1.0, 1.0]] {
+            let mut edit = scene.edit();
+            let to =
+                serde_json::json!({ "position_m": [0, 5, 0], "rotation_deg": [0, 90, 0], "scale": scale });
+            edit.move_object("crate", to.as_object().unwrap()).unwrap();
+            let map = edit.finish();
+            let map = map.world_from_proxy(&map.vpls.proxies[0]);
+            let unit = map.matrix3.transpose() * map.matrix3;
+            assert!(unit.abs_diff_eq(glam::DMat3::IDENTITY, 1e-12), "{scale:?}: {unit}");
+            assert!((map.matrix3.determinant() - 1.0).abs() < 1e-12, "{scale:?}");
+            // What was at x = 1 is at z = -1, times the stretch along x.
+            let expected = DVec3::new(0.0, 5.0, -scale[0]);
+            assert!(map.translation.abs_diff_eq(expected, 1e-9), "{scale:?}: {}", map.translation);
+        }
+    }
+
     /// The hull of a box's corners is met where the box is: 500 rays. Tolerance: a few roundings of f64.
     #[test]
     fn a_hull_of_corners_is_the_box() {

@@ -4,7 +4,7 @@
 use super::{VplSet, VplTables};
 use crate::{
     SceneConfig, SceneError,
-    config::{Field, ProxyConfig, Vector, VplsConfig},
+    config::{Field, ProxyConfig, Vector, VplConfig, VplsConfig},
     settings::PhantomSurfaces,
 };
 use serde::Serialize;
@@ -29,7 +29,11 @@ impl VplSet {
             let before = config.vpls.clone().unwrap_or_default();
             write_settings(&mut document, &before, vpls, &defaults(!proxy.is_empty()));
         }
-        write_list(&mut document, "vpl", &config.vpl, vpl);
+        // What tells that an entry is as `place` has written it stays in it, whoever the tables come from.
+        let unmarked = |list: &[VplConfig]| -> Vec<VplConfig> {
+            list.iter().map(|vpl| VplConfig { placed: None, ..vpl.clone() }).collect()
+        };
+        write_list(&mut document, "vpl", &unmarked(&config.vpl), &unmarked(vpl));
         write_list(&mut document, "blocker", &config.blocker, blocker);
         let before: Vec<ProxyConfig> = config.proxy.iter().cloned().map(with_defaults).collect();
         write_list(&mut document, "proxy", &before, proxy);
@@ -107,7 +111,7 @@ fn write_list<T: Serialize + PartialEq>(document: &mut DocumentMut, name: &str, 
             Some((wanted, left)) => {
                 if let Some(entry) = tables.get_mut(at) {
                     let (before, wanted) = (table(first), table(wanted));
-                    entry.retain(|key, _| wanted.contains_key(key));
+                    entry.retain(|key, _| wanted.contains_key(key) || !before.contains_key(key));
                     // What says the same stays as it is written.
                     let is_other = |key: &str, value: &Item| {
                         before.get(key).is_none_or(|before| before.to_string() != value.to_string())
@@ -214,6 +218,31 @@ mod tests {
         let text = edited(json!({ "vpl": [vpl(1.0), second, vpl(3.0), vpl(4.0)] }));
         assert!(text.starts_with(TEXT.split("[[proxy]]").next().unwrap()), "{text}");
         assert_eq!(edited(json!({ "vpl": [] })).matches("[[vpl]]").count(), 0);
+    }
+
+    /// What `place` has marked stays marked, moved or not: that it was edited is seen by the mark.
+    #[test]
+    fn marks_of_placed_vpls_stay() {
+        let text = TEXT.replace("# here", "# here\nplaced = \"0123456789abcdef\"");
+        let file = Path::new("scene.toml");
+        let scene = SceneConfig::from_text(&text, file).unwrap().build().unwrap();
+        let mut second = vpl(2.0);
+        second["weight"] = json!(3);
+        for (x, expected) in [(1.0, text.clone()), (1.5, text.replace("[1, 0, 0] #", "[1.5, 0.0, 0.0] #"))] {
+            let mut edit = scene.edit();
+            let values = json!({ "vpl": [vpl(x), second, vpl(3.0)] });
+            edit.set_vpls(values.as_object().unwrap()).unwrap();
+            assert_eq!(edit.finish().vpls.written_into(&text, file).unwrap(), expected);
+        }
+    }
+
+    /// What was said of nobody changes with what it follows from: without proxies, axes meet the scene.
+    #[test]
+    fn defaults_go_with_proxies() {
+        let text = edited(json!({ "proxy": [] }));
+        assert!(!text.contains("phantom_surfaces") && !text.contains("[[proxy]]"), "{text}");
+        let scene = SceneConfig::from_text(&text, Path::new("scene.toml")).unwrap().build().unwrap();
+        assert_eq!(scene.vpls.settings.phantom_surfaces, PhantomSurfaces::Scene);
     }
 
     /// A key that is gone goes, settings change or come, and other lists are begun.

@@ -43,13 +43,19 @@ impl Constellation {
         let is_same = self.of.as_ref().is_some_and(|(set, geometry)| {
             Arc::ptr_eq(set, &scene.vpls) && Arc::ptr_eq(geometry, &scene.geometry)
         });
-        self.has_changed = !is_same;
+        self.has_changed = false;
         let settings = &scene.vpls.settings;
         if !is_same {
             let is_first = self.of.is_none();
             self.of = Some((Arc::clone(&scene.vpls), Arc::clone(&scene.geometry)));
-            self.place(scene);
+            let before = std::mem::take(&mut self.vpls);
+            self.place(scene, &before);
+            self.has_changed = self.vpls != before;
+            let is_elsewhere = is_first || !self.are_where(&before);
+            // Where all are given, or nothing has come closer, there is nothing to compare.
+            let are_due = is_elsewhere && scene.vpls.vpls.iter().any(|vpl| vpl.weight.is_none());
             match settings.weights {
+                _ if !are_due => {}
                 Weights::Amortised if !is_first => self.steps_left = (self.vpls.len() as u64).pow(2),
                 _ => automatic_weights(&mut self.vpls, settings.area_per_weight),
             }
@@ -103,23 +109,27 @@ impl Constellation {
         }
     }
 
-    fn place(&mut self, scene: &Scene) {
+    /// Whether there are as many as `before`, in the same places.
+    fn are_where(&self, before: &[Vpl]) -> bool {
+        let places = |vpls: &[Vpl]| vpls.iter().map(|vpl| vpl.position).collect::<Vec<_>>();
+        places(&self.vpls) == places(before)
+    }
+
+    fn place(&mut self, scene: &Scene, before: &[Vpl]) {
         let VplSet { vpls, blockers, .. } = &*scene.vpls;
-        // Amortised weights stay what they were until they are computed anew.
-        self.vpls.resize(
-            vpls.len(),
-            Vpl { position: Vec3::ZERO, normal: Vec3::Y, albedo: Vec3::ZERO, weight: 1.0 },
-        );
-        for (now, placed) in self.vpls.iter_mut().zip(vpls) {
+        // Weights that are not given stay what they were until they are computed anew.
+        let weights = before.iter().map(|vpl| vpl.weight).chain(std::iter::repeat(1.0));
+        self.vpls.clear();
+        self.vpls.extend(vpls.iter().zip(weights).map(|(placed, before)| {
             let vpls::Vpl { position, normal, albedo, weight, object } = *placed;
             let map = scene.world_from_anchor(object);
-            *now = Vpl {
+            Vpl {
                 position: map.transform_point3(position).as_vec3(),
                 normal: moved_normal(&map.matrix3, normal).as_vec3().normalize_or(Vec3::Y),
                 albedo,
-                weight: weight.unwrap_or(now.weight),
-            };
-        }
+                weight: weight.unwrap_or(before),
+            }
+        }));
         self.blockers.clear();
         self.blockers.extend(blockers.iter().map(|blocker| {
             let map = scene.world_from_anchor(blocker.object);

@@ -5,7 +5,7 @@
 //! the lights' own profiles instead of uniform random ones.
 
 use super::{Shown, constellation::as_vpl};
-use crate::{apportion::apportion, emitters::watts};
+use crate::{apportion::apportion, emitters::watts, streams::stream_of};
 use glam::Vec3;
 use photonstream_running_light::{VirtualLight, automatic_weights};
 use photonstream_scene::{Detail, ObjectId, Scene, Side, bvh::Ray};
@@ -33,7 +33,7 @@ pub(super) fn trace(scene: &Scene) -> Vec<Vec<Shown>> {
     let lights = scene.lights.iter().zip(watts).zip(counts);
     lights
         .map(|((light, watts), count)| {
-            let sequence = Sequence::new(scene.streaming.seed, STREAM);
+            let sequence = Sequence::new(scene.streaming.seed, stream_of(&light.name, STREAM));
             let photon = |index: u32| {
                 let emission = light.light.shape.emit(scene.bounds, &mut sequence.sample(index.into()));
                 let flux = watts * emission.weight / count as f32;
@@ -66,14 +66,15 @@ fn meet(scene: &Scene, origin: Vec3, direction: Vec3, flux: Vec3) -> Option<Show
 pub(super) fn give_areas(scene: &Scene, lights: &mut [Shown]) {
     let shining: Vec<usize> =
         (0..lights.len()).filter(|&index| lights[index].light.flux != Vec3::ZERO).collect();
+    let share = scene.reflecting_area_m2() / shining.len().max(1) as f64;
     if shining.len() > MOST_COMPARED {
-        let share = scene.reflecting_area_m2() / shining.len() as f64;
         shining.iter().for_each(|&index| lights[index].light.area = share as f32);
         return;
     }
     let mut vpls: Vec<_> = shining.iter().map(|&index| as_vpl(&lights[index].light)).collect();
     automatic_weights(&mut vpls, 1.0);
     for (&index, vpl) in shining.iter().zip(&vpls) {
-        lights[index].light.area = vpl.weight;
+        // Those that coincide have no disc.
+        lights[index].light.area = if vpl.weight > 0.0 { vpl.weight } else { share as f32 };
     }
 }

@@ -26,7 +26,7 @@ use crate::{
 };
 use crossbeam::queue::ArrayQueue;
 use fade::Fade;
-use few::Few;
+use few::{Few, Passing};
 pub(super) use messages::{Asked, Change, FromLedger, LightsWanted, ToLedger, Version};
 use moves::Moves;
 use photonstream_protocol::monotonic_ns;
@@ -299,7 +299,12 @@ impl LedgerActor {
             ToLedger::Change(change, reply) => {
                 match change {
                     Change::Pause => progress.paused = true,
-                    Change::Resume => progress.paused = false,
+                    Change::Resume => {
+                        progress.paused = false;
+                        if let Some(few) = &mut progress.few {
+                            few.resume();
+                        }
+                    }
                     Change::Step => {}
                 }
                 progress.stepping = progress.paused && matches!(change, Change::Step);
@@ -315,7 +320,7 @@ impl LedgerActor {
             ToLedger::Time(time_s) => {
                 progress.time_s = time_s;
                 // What fades goes on with time; else there is nothing to be shown.
-                progress.changed |= progress.fade.is_some();
+                progress.changed |= progress.is_on_its_way();
                 progress.unsettled = true;
             }
             ToLedger::Query(reply) => {
@@ -333,7 +338,13 @@ impl LedgerActor {
         let scene = &progress.simulation.scene;
         let (now_ms, time_s, is_in_steps) = (progress.now_ms(), progress.time_s, progress.is_in_steps());
         if let Some(few) = &mut progress.few {
-            few.go_on(scene, begun, time_s, is_in_steps);
+            let passing = match (progress.paused, progress.stepping) {
+                (true, true) => Passing::OneStep,
+                (true, false) => Passing::Paused,
+                _ if is_in_steps => Passing::Steps,
+                _ => Passing::Clock,
+            };
+            few.go_on(scene, begun, time_s, passing);
             vsls.records = few.lights.records(progress.placements as u32);
             (vsls.placement, vsls.version) = (progress.placements, progress.places);
         } else if vsls.placement != progress.placements {

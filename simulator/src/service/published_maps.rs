@@ -76,9 +76,9 @@ impl PublishedMaps {
         (&self.records, &self.changed)
     }
 
-    /// Whether they are those of the lights of `placement`.
-    pub(super) fn are_of(&self, placement: u64) -> bool {
-        self.placement == Some(placement)
+    /// Whether they are those of the `lights` lights of `placement`.
+    pub(super) fn are_of(&self, placement: u64, lights: usize) -> bool {
+        self.placement == Some(placement) && self.records.len() == lights * self.each
     }
 
     /// Notes that the frame was published.
@@ -115,7 +115,7 @@ mod tests {
         let (records, changed) = maps.records();
         assert_eq!([0, 1, 2, 3].map(|c| changed.contains(c)), [false, true, false, false]);
         assert_eq!((records[80].texels, records[2].texels), ([9; 16], [7; 16]));
-        assert!(maps.are_of(3) && !maps.are_of(4));
+        assert!(maps.are_of(3, 100) && !maps.are_of(4, 100) && !maps.are_of(3, 99));
         maps.update(Some(&update(4, 5, vec![])));
         assert!(maps.records().0.iter().all(|r| r.texels == [0; 16]) && maps.records().0.len() == 10);
         maps.update(None);

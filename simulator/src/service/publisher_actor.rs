@@ -225,7 +225,7 @@ impl PublisherActor {
         let patches_changed = if is_same { ChunkSet::for_records(count) } else { ChunkSet::all(count) };
         // What fails to be published is not what was published last.
         self.patches = None;
-        let has_maps = self.maps.are_of(snapshot.vsls.placement);
+        let has_maps = self.maps.are_of(snapshot.vsls.placement, snapshot.vsls.records.len());
         let (distances, distances_changed) = if has_maps { self.maps.records() } else { (&[][..], &none) };
         let published = self.publisher.publish(&FrameSource {
             vsls: &snapshot.vsls.records,

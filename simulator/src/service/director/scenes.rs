@@ -268,7 +268,8 @@ impl Director {
         if self.animate() != Motion::Still {
             return;
         }
-        if self.clock.is_fixed() && self.simulation.scene.streaming.adaptive {
+        let goes_on_alone = self.simulation.scene.streaming.adaptive || !self.simulation.is_streaming();
+        if self.clock.is_fixed() && goes_on_alone {
             // It says when it has shown this instant; if it is gone, that is told by another way.
             let _ = self.to_ledger.send(ToLedger::Time(self.animated_s));
         } else {
