@@ -59,7 +59,7 @@ fn requests_are_answered_in_order() {
                     replier.reply(Reply::State { state: serde_json::json!({"paths_per_s": 1.5}) })
                 }
                 Request::Reload => drop(replier),
-                Request::Step => replier.reply(Reply::State { state: "x".repeat(70_000).into() }),
+                Request::Step => replier.reply(Reply::State { state: "x".repeat(300_000).into() }),
                 Request::Shutdown => {
                     replier.reply(Reply::Ok { frame: 0 });
                     break;
@@ -79,9 +79,9 @@ fn requests_are_answered_in_order() {
         [(Request::Reload, "unanswered"), (Request::Pause, "refused"), (Request::Step, "reply-too-long")]
     {
         let answer = client.request(&request, LIMIT).unwrap();
-        assert!(matches!(&answer, Reply::Error { code, .. } if code == expected), "{answer:?}");
+        assert!(matches!(&answer, Reply::Error { code, .. } if code == expected), "{expected}");
     }
-    let long = Request::SetLight { name: "x".repeat(70_000), values: Default::default() };
+    let long = Request::SetLight { name: "x".repeat(300_000), values: Default::default() };
     assert!(matches!(client.request(&long, LIMIT), Err(ProtocolError::Control { .. })));
     assert_eq!(client.request(&Request::Shutdown, LIMIT).unwrap(), Reply::Ok { frame: 0 });
     handler.join().unwrap();
