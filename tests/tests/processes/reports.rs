@@ -52,8 +52,8 @@ fn json_reports_have_their_documented_keys() {
     has_keys(
         &check,
         &keys(
-            "scene scene_hash objects triangles materials lights vsls pool_paths width_px height_px kernel visibility \
-             origin_m extent_m choices notices decisions",
+            "scene scene_hash objects triangles materials lights method method_reasons published_lights vpls blockers \
+             proxies vsls pool_paths width_px height_px kernel visibility origin_m extent_m choices notices decisions",
         ),
     );
     has_keys(&check["decisions"][0], &keys("what modelled reason"));
