@@ -118,7 +118,8 @@ pub fn figures(
     }
     let photons = PHOTONS.map(|vsls| {
         let point = Point { vsls, ..point(Method::FixedPhotons) };
-        studio.shot(&format!("{vsls} photons"), &point, scene)
+        let plural = if vsls == 1 { "" } else { "s" };
+        studio.shot(&format!("{vsls} photon{plural}"), &point, scene)
     });
     let mut shots: Vec<FigureShot> = photons.into_iter().collect::<Result<_, _>>()?;
     shots.push(studio.shot("predefined VPLs", &point(own), scene)?);
