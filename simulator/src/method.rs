@@ -146,4 +146,16 @@ mod tests {
             "{reasons:?}"
         );
     }
+
+    /// A sky lights no VPL: photons are traced there, however fast VPLs would be.
+    #[test]
+    fn a_sky_is_not_left_to_vpls() {
+        let text = format!(
+            "{SCENE}\nlight.s = {{ sky = {{ radiance_w_m2_sr = 1 }} }}\n[streaming]\nmethod = \"auto\"\nupdate_budget_us = 100\n{VPL}"
+        );
+        let config = SceneConfig::from_text(&text, Path::new("scene.toml")).unwrap();
+        let choice = choose(&config.build().unwrap());
+        assert_eq!(choice.method, Method::InstantRadiosity, "{:?}", choice.reasons);
+        assert!(choice.reasons.iter().any(|reason| reason.contains("sky")), "{:?}", choice.reasons);
+    }
 }

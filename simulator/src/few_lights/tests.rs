@@ -264,3 +264,53 @@ fn polygons_have_the_area_of_their_light() {
         assert_eq!(octagon(&none), PatchRecord::default());
     }
 }
+
+/// Two lamps in one place have directions of their own, and no photon's light is without an area.
+#[test]
+fn photons_of_lamps_in_one_place_differ() {
+    let lamp =
+        |name: &str| format!("light.{name} = {{ power_w = 50, point = {{ position_m = [0, 2, 0] }} }}\n");
+    let text =
+        format!("{}{}streaming.method = \"instant-radiosity\"\nvpls.photons = 40\n", lamp("a"), lamp("b"));
+    let shining: Vec<Shown> =
+        updated(&scene(&text)).into_iter().filter(|shown| shown.light.flux != Vec3::ZERO).collect();
+    assert!(shining.len() > 8, "{}", shining.len());
+    for (index, shown) in shining.iter().enumerate() {
+        assert!(shown.light.area > 0.0);
+        assert!(shining[..index].iter().all(|other| other.light.position != shown.light.position));
+    }
+}
+
+/// Photons that coincide all the same have their share of the surfaces: no light is a point.
+#[test]
+fn coinciding_photons_have_an_area() {
+    let floor = scene(POINT);
+    let light = VirtualLight { position: Vec3::ZERO, normal: Vec3::Y, flux: Vec3::ONE, area: 0.0 };
+    let mut shown = [Shown { light, object: None }; 2];
+    photons::give_areas(&floor, &mut shown);
+    let share = (floor.reflecting_area_m2() / 2.0) as f32;
+    assert!(shown.iter().all(|shown| shown.light.area == share), "{shown:?}, {share}");
+}
+
+/// What moves elsewhere leaves amortised weights as they are: only VPLs that come closer are compared anew, and none where
+/// all weights are given.
+#[test]
+fn weights_are_left_alone_where_nothing_comes_closer() {
+    let vpl = |x: f32, more: &str| {
+        format!("[[vpl]]\nposition_m = [{x}, 0, 0]\nnormal = [0, 1, 0]\nalbedo = 0.5\n{more}\n")
+    };
+    let moved = |vpls: String| {
+        let scene = static_scene(POINT, &format!("vpls.weights = \"amortised\"\n{vpls}"));
+        let mut few = FewLights::new(&scene, Method::StaticVpl);
+        few.update(&scene, 0.0);
+        let mut edit = scene.edit();
+        let to = serde_json::json!({ "position_m": [0.5, 0.5, 1] });
+        edit.move_object("crate", to.as_object().unwrap()).unwrap();
+        few.update(&edit.finish(), 0.01);
+        few.is_following()
+    };
+    let riding = "object = \"crate\"";
+    assert!(!moved(vpl(0.0, "") + &vpl(1.0, "")), "none has moved");
+    assert!(!moved(vpl(0.0, "weight = 1") + &vpl(1.0, &format!("weight = 1\n{riding}"))), "all are given");
+    assert!(moved(vpl(0.0, "") + &vpl(1.0, riding)));
+}

@@ -338,12 +338,7 @@ impl LedgerActor {
         let scene = &progress.simulation.scene;
         let (now_ms, time_s, is_in_steps) = (progress.now_ms(), progress.time_s, progress.is_in_steps());
         if let Some(few) = &mut progress.few {
-            let passing = match (progress.paused, progress.stepping) {
-                (true, true) => Passing::OneStep,
-                (true, false) => Passing::Paused,
-                _ if is_in_steps => Passing::Steps,
-                _ => Passing::Clock,
-            };
+            let passing = Passing::of(progress.paused, progress.stepping, is_in_steps);
             few.go_on(scene, begun, time_s, passing);
             vsls.records = few.lights.records(progress.placements as u32);
             (vsls.placement, vsls.version) = (progress.placements, progress.places);

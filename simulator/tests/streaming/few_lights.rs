@@ -217,6 +217,23 @@ fn held_scenes_are_not_saved_into_their_files() {
     service.end();
 }
 
+/// With `auto`, edits that leave a method without what it needs, or give it that, change the choice.
+#[test]
+fn edits_of_vpls_change_what_auto_chooses() {
+    let first = Simulation::new(Arc::new(room("method = \"auto\"\nupdate_budget_us = 100")));
+    assert_eq!(first.method, Method::PhantomVpl);
+    let service = start("few-auto", &first, 1, None);
+    let mut client = service.connect();
+    let vpl = json!({ "position_m": [0, -2, 0], "normal": [0, 1, 0], "albedo": 0.6 });
+    for (vpls, method) in [(json!([]), "instant-radiosity"), (json!([vpl]), "phantom-vpl")] {
+        let set = Request::SetVpls { values: values(json!({ "vpl": vpls })) };
+        number(&client.request(&set, PATIENCE).unwrap());
+        let Reply::State { state } = client.request(&Request::Query, PATIENCE).unwrap() else { panic!() };
+        assert_eq!(state["method"], method);
+    }
+    service.end();
+}
+
 /// A phantom goes from floor to wall in frames in between, and comes to rest exactly where the axis ends.
 #[test]
 fn phantoms_go_on_in_frames_of_their_own() {

@@ -27,6 +27,18 @@ pub(super) enum Passing {
     Paused,
 }
 
+impl Passing {
+    /// In a simulation that is paused, or makes one step of a pause, or goes in fixed steps.
+    pub(super) fn of(is_paused: bool, is_stepping: bool, is_in_steps: bool) -> Self {
+        match (is_paused, is_stepping) {
+            (true, true) => Self::OneStep,
+            (true, false) => Self::Paused,
+            _ if is_in_steps => Self::Steps,
+            _ => Self::Clock,
+        }
+    }
+}
+
 impl Few {
     pub(super) fn new(lights: FewLights) -> Self {
         Self { lights, last: None }
