@@ -5,10 +5,19 @@
 //! through [`exec_plug_in`], which has the system send it SIGTERM instead (Linux).
 
 use crate::error::LauncherError;
-use std::{ffi::OsString, io::Read, os::unix::process::CommandExt, process::Command};
+use std::{
+    ffi::OsString,
+    io::Read,
+    os::unix::process::CommandExt,
+    process::Command,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 /// Environment variable that makes standard input a lifeline.
 pub(crate) const OWNED: &str = "PHOTONSTREAM_OWNED";
+
+/// Set once the launcher is seen to be gone.
+static LAUNCHER_IS_GONE: AtomicBool = AtomicBool::new(false);
 
 /// Ends this process in order when its launcher is gone, if it has one.
 pub(crate) fn end_with_launcher() {
@@ -25,6 +34,7 @@ pub(crate) fn end_with_launcher() {
                 _ => break,
             }
         }
+        LAUNCHER_IS_GONE.store(true, Ordering::Release);
         if let Err(error) = signal_hook::low_level::raise(signal_hook::consts::SIGTERM) {
             tracing::error!("the launcher is gone, and ending in order failed ({error}); ending at once");
             std::process::exit(1);
@@ -38,6 +48,11 @@ pub(crate) fn end_with_launcher() {
 /// Whether this process was started by a launcher.
 pub(crate) fn is_owned() -> bool {
     std::env::var_os(OWNED).is_some_and(|value| value == "1")
+}
+
+/// Whether this process was started by a launcher that has ended since.
+pub(crate) fn launcher_is_gone() -> bool {
+    LAUNCHER_IS_GONE.load(Ordering::Acquire)
 }
 
 /// Becomes the program `command`, which the system will end with SIGTERM when the launcher `parent` is gone.

@@ -60,6 +60,7 @@ pub struct Publisher {
     notice: PublishedText,
     process: u32,
     abandoned: bool,
+    keeps_names: bool,
 }
 
 impl std::fmt::Debug for Publisher {
@@ -112,6 +113,7 @@ impl Publisher {
             notice: PublishedText::default(),
             process: std::process::id(),
             abandoned: false,
+            keeps_names: false,
         })
     }
 
@@ -240,6 +242,12 @@ impl Publisher {
     /// then the channel is abandoned.
     pub fn close(self) {}
 
+    /// Ends the channel, and leaves its names: a reader that is still starting finds the last frame, and sees `Retired`.
+    /// Whoever started this process removes them ([`crate::clean_one`]); so does the next publisher.
+    pub fn close_findable(mut self) {
+        self.keeps_names = true;
+    }
+
     /// Leaves the channel as a crash would: readers see that the publisher is `Gone`, keep the last frame and wait for
     /// its successor, which removes what is left here.
     pub fn abandon(mut self) {
@@ -279,6 +287,9 @@ impl Drop for Publisher {
             return;
         }
         self.segment.end(state::CLOSED);
+        if self.keeps_names {
+            return;
+        }
         let dir = &self.claim.dir;
         if dir.current().is_ok_and(|current| current.segment == self.segment.name) {
             // What cannot be removed now is removed by the next publisher or by `clean`.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::layout::ABI_MAJOR;
 use crate::record::{ArrayKind, FieldType, LAYOUT_HASH};
 
 fn tables() -> String {
@@ -30,4 +31,9 @@ fn the_readme_shows_the_records_as_they_are() {
     let readme = include_str!("../README.md");
     assert!(readme.contains(tables().trim()), "expected in README.md:\n{}", tables());
     assert!(readme.contains(&format!("{LAYOUT_HASH:#018x}")), "layout hash {LAYOUT_HASH:#018x}");
+    for words in
+        [format!("ABI {ABI_MAJOR};"), format!("ABI major = {ABI_MAJOR} "), format!("\"abi\":{ABI_MAJOR}}}")]
+    {
+        assert!(readme.contains(&words), "{words}");
+    }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use photonstream_protocol::{
     AccessMode, ChannelName, ChunkSet, ControlServer, FrameSource, Liveness, ProtocolError, Publisher,
-    Reading, Runtime, Subscriber, VslRecord, Wake,
+    Reading, Runtime, Subscriber, VslRecord, Wake, clean_in,
 };
 use support::{Content, check, spec, version};
 
@@ -298,6 +298,34 @@ fn waiting_ends_for_each_reason() {
         assert_eq!(reader.liveness(), Liveness::Retired);
         assert_eq!(reader.frame().unwrap().frame, 1);
         assert_eq!(reader.wait(Duration::from_millis(20)), Wake::TimedOut);
+        assert!(matches!(
+            Subscriber::attach_in(&runtime, &channel, mode),
+            Err(ProtocolError::NotCreated { .. })
+        ));
+    }
+}
+
+/// A channel that is left findable at its end shows its last frame to who comes late, until somebody removes it or the
+/// next publisher comes.
+#[test]
+fn a_channel_that_is_left_findable_has_its_last_frame() {
+    for mode in MODES {
+        let (_root, runtime, channel, mut publisher) = start(10);
+        let statistics = Default::default();
+        publisher.publish(&Content::default_source(&statistics)).unwrap();
+        publisher.close_findable();
+        let mut late = Subscriber::attach_in(&runtime, &channel, mode).unwrap();
+        assert_eq!(late.liveness(), Liveness::Retired);
+        assert_eq!(read(&mut late), Reading::New);
+        assert_eq!(late.frame().unwrap().frame, 1);
+        assert_eq!(late.wait(Duration::from_secs(60)), Wake::StateChanged);
+        assert_eq!(late.wait(Duration::from_millis(20)), Wake::TimedOut);
+        let successor = Publisher::create_in(&runtime, &channel, &spec(10)).unwrap();
+        assert_eq!(late.wait(Duration::from_secs(60)), Wake::StateChanged);
+        assert_eq!(late.liveness(), Liveness::Live);
+        successor.close_findable();
+        let removed = clean_in(&runtime).unwrap();
+        assert_eq!(removed.iter().map(|found| found.segments.len()).sum::<usize>(), 1);
         assert!(matches!(
             Subscriber::attach_in(&runtime, &channel, mode),
             Err(ProtocolError::NotCreated { .. })

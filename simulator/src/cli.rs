@@ -39,6 +39,9 @@ pub struct Args {
     /// Settings that override the config's
     #[command(flatten)]
     pub overrides: Overrides,
+    /// The channel is left at an orderly end, for the caller to remove
+    #[arg(skip)]
+    pub leaves_channel: bool,
 }
 
 /// Settings that override the config's `[streaming]` table.
@@ -201,6 +204,7 @@ pub fn run(args: &Args) -> Result<Summary, SimulatorError> {
         threads: args.threads.map(|t| t as usize),
         after_paths: args.after,
         has_no_fade: args.no_fade,
+        leaves_channel: args.leaves_channel,
         config: (!args.no_watch).then_some(source),
     };
     service::run(simulation, &options, &stop)

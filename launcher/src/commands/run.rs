@@ -155,10 +155,7 @@ pub(crate) fn show(args: &Args, names: &[String], global: &Global) -> Result<(),
     let result = result.and_then(|()| watch(&mut supervisor, &channel, renderers));
     supervisor.end();
     let recorded = recording.map(Background::finish).transpose();
-    let left_over = supervisor.fates(Kind::Simulator).iter().any(|fate| fate.crashed);
-    if args.channel.is_none() || left_over {
-        remove_channel(&channel);
-    }
+    remove_channel(&channel);
     result?;
     let (recording, lost) = match recorded {
         Ok(taken) => (taken.flatten(), None),
@@ -236,10 +233,10 @@ fn watch(
     Ok(())
 }
 
-/// Waits for renderers to show what they have, for as long as they take.
+/// Waits for renderers to show what there is, for as long as they take: the simulator leaves its last frame, also to one
+/// that has not seen it yet, or that crashes and is started again.
 fn last_pictures(supervisor: &mut Supervisor) -> Result<(), LauncherError> {
     while !supervisor.is_over(Kind::Renderer) {
-        supervisor.give_up_restarts("there is no light left to start it again for");
         supervisor.attend(LOOK)?;
     }
     Ok(())

@@ -27,8 +27,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
     owned::end_with_launcher();
-    let summary = cli::run(&args.simulator)?;
-    remove_channel(&args.simulator.channel);
+    // Renderers that a launcher is just starting find the last frame: it removes the channel when they are done.
+    let summary = cli::run(&cli::Args { leaves_channel: owned::is_owned(), ..args.simulator.clone() })?;
+    if !owned::is_owned() || owned::launcher_is_gone() {
+        remove_channel(&args.simulator.channel);
+    }
     // A launcher reports for its children.
     if owned::is_owned() { Ok(()) } else { output::report(global.json, &summary, text) }
 }

@@ -43,8 +43,6 @@ pub(crate) struct Fate {
     pub(crate) restarts: u32,
     /// Whether it failed for good.
     pub(crate) failed: bool,
-    /// Whether it ever ended otherwise than in order.
-    pub(crate) crashed: bool,
     /// Name of what has taken its place.
     pub(crate) replaced_by: Option<String>,
 }
@@ -101,12 +99,6 @@ impl Supervisor {
         Ok(())
     }
 
-    /// Gives up the renderers that wait to be started again, and says `why`.
-    pub(crate) fn give_up_restarts(&mut self, why: &str) {
-        let renderers = self.processes.iter_mut().filter(|p| p.is(Kind::Renderer));
-        self.failures.extend(renderers.filter_map(|p| p.give_up_restart(why)));
-    }
-
     /// Whether all processes of a kind have ended and will not be started again.
     pub(crate) fn is_over(&self, kind: Kind) -> bool {
         self.processes.iter().filter(|p| p.is(kind)).all(Process::is_over)
@@ -122,7 +114,6 @@ impl Supervisor {
         let fate = |p: &Process| Fate {
             restarts: p.restarts,
             failed: matches!(p.state, State::Failed),
-            crashed: p.crashed,
             replaced_by: p.replaced_by.clone(),
         };
         self.processes.iter().filter(|p| p.is(kind)).map(fate).collect()

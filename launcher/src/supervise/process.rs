@@ -32,8 +32,6 @@ pub(super) struct Process {
     pub(super) role: Role,
     pub(super) state: State,
     pub(super) restarts: u32,
-    /// It ended otherwise than in order at least once: it may have left something behind.
-    pub(super) crashed: bool,
     /// Name of what has taken its place.
     pub(super) replaced_by: Option<String>,
     backoff: Backoff,
@@ -43,7 +41,7 @@ impl Process {
     pub(super) fn start(role: Role, output: ChildOutput) -> Result<Self, LauncherError> {
         let first = role.sequence.as_ref().map_or_else(Vec::new, Sequence::whole);
         let state = spawn(&role, &first, output)?;
-        Ok(Self { role, state, restarts: 0, crashed: false, replaced_by: None, backoff: Backoff::default() })
+        Ok(Self { role, state, restarts: 0, replaced_by: None, backoff: Backoff::default() })
     }
 
     /// Looks whether it has ended. The error is that of a process that failed for good.
@@ -58,7 +56,6 @@ impl Process {
         if status.success() {
             return Ok(());
         }
-        self.crashed = true;
         self.judge(status, uptime, voice.last_words())
     }
 
@@ -154,14 +151,6 @@ impl Process {
         }
     }
 
-    /// Lets it wait no more for its restart; its failure, if it did.
-    pub(super) fn give_up_restart(&mut self, why: &str) -> Option<LauncherError> {
-        let State::Waiting { .. } = self.state else { return None };
-        self.state = State::Failed;
-        let (name, how) = (self.role.name.clone(), "was not started again".into());
-        Some(LauncherError::Child { name, how, said: vec![why.to_owned()], code: exit::CHILD })
-    }
-
     /// Asks it to end, or ends it; one that waits for its restart waits no more.
     pub(super) fn signal(&mut self, signal: Signal) {
         match &self.state {
@@ -180,9 +169,8 @@ impl Process {
     /// Collects it without judging, at the end of all.
     pub(super) fn collect(&mut self) {
         if let State::Running { child, .. } = &mut self.state
-            && let Ok(Some(status)) = child.try_wait()
+            && let Ok(Some(_)) = child.try_wait()
         {
-            self.crashed |= !status.success();
             let State::Running { voice, .. } = std::mem::replace(&mut self.state, State::Done) else {
                 return;
             };

@@ -224,6 +224,7 @@ impl Follower {
             threads: Some(threads()),
             after_paths: None,
             has_no_fade: false,
+            leaves_channel: false,
             config: None,
         };
         let (stop, stopped) = flume::bounded(1);

@@ -89,6 +89,7 @@ fn stream(simulation: &Simulation, threads: usize, time: Duration) -> Result<Thr
         threads: Some(threads),
         after_paths: None,
         has_no_fade: false,
+        leaves_channel: false,
         config: None,
     };
     let (stop, stopped) = flume::bounded(1);

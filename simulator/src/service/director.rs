@@ -40,6 +40,8 @@ pub struct Options {
     pub after_paths: Option<u64>,
     /// Virtual surface lights that move are shown where they are at once.
     pub has_no_fade: bool,
+    /// The channel is left at an orderly end, with its last frame, for the caller to remove.
+    pub leaves_channel: bool,
     /// Where the scene comes from: it is loaded again when it changes there. `None`: it stays.
     pub config: Option<ConfigSource>,
 }

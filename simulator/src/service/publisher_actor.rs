@@ -120,6 +120,8 @@ pub(super) struct PublisherActor {
     /// Set before an orderly end; without it the channel is left as a crash leaves it, so that renderers wait for the
     /// simulator to come back instead of taking a half-lit frame for the last.
     pub(super) orderly: Arc<AtomicBool>,
+    /// Who comes after an orderly end still finds the last frame; somebody else removes the channel.
+    pub(super) stays_findable: bool,
     /// The segment that could not be made.
     pub(super) refused: Option<Refused>,
     /// The patches published last.
@@ -141,7 +143,11 @@ impl PublisherActor {
         let result = self.publish_all();
         // Set before the ledger was told to end, which is what ended the snapshots.
         if result.is_ok() && self.orderly.load(Ordering::Acquire) {
-            self.publisher.close();
+            if self.stays_findable {
+                self.publisher.close_findable();
+            } else {
+                self.publisher.close();
+            }
         } else {
             self.publisher.abandon();
         }

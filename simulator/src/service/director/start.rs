@@ -74,6 +74,7 @@ impl Director {
             emptied: Arc::clone(&emptied),
             latest_frame: Arc::clone(&latest_frame),
             orderly: Arc::clone(&orderly),
+            stays_findable: options.leaves_channel,
             refused: None,
             patches: None,
             maps: PublishedMaps::default(),

@@ -58,6 +58,7 @@ fn the_last_scene_goes_on_where_there_is_no_room() {
         emptied: Arc::clone(&emptied),
         latest_frame: Arc::new(AtomicU64::new(0)),
         orderly: Arc::new(AtomicBool::new(true)),
+        stays_findable: false,
         refused: None,
         patches: None,
         maps: PublishedMaps::default(),
