@@ -125,6 +125,8 @@ struct Director {
     animation_error: String,
     /// The file of the scene, if it is one that can be written.
     config_file: Option<saving::ConfigFile>,
+    /// What was saved into it, until the watcher has found it there.
+    saved: Option<String>,
     /// Hash of the config that was loaded last.
     loaded_hash: u64,
     news: flume::Receiver<News>,

@@ -17,8 +17,8 @@ use std::{
 
 /// What has become of the config.
 pub(super) enum News {
-    /// It is another scene.
-    Scene(Box<Scene>),
+    /// It is another scene; with its text, where that alone has changed.
+    Scene(Box<Scene>, Option<String>),
     /// It is no scene: why, with file, line and column.
     Broken(String),
 }
@@ -231,12 +231,14 @@ impl Watch {
         if self.tried.as_ref() == Some(&text) && !assets_changed {
             return None;
         }
+        let assets_before = self.assets_seen.clone();
         let loaded = self.load(&text)?;
-        self.tried = Some(text);
+        let is_text_alone = !assets_changed && self.assets_seen == assets_before;
+        self.tried = Some(text.clone());
         match loaded {
             Ok(scene) => match std::mem::replace(&mut self.told_last, Told::Scene(scene.hash)) {
                 Told::Scene(hash) if hash == scene.hash => None,
-                _ => Some(News::Scene(Box::new(scene))),
+                _ => Some(News::Scene(Box::new(scene), is_text_alone.then_some(text))),
             },
             Err(error) => self.tell_broken(error.to_string()),
         }

@@ -169,6 +169,9 @@ fn configs_change_methods_and_take_edits() {
     let set = Request::SetVpls { values: values(json!({ "vpl": [vpl] })) };
     let reply = client.request(&set, PATIENCE).unwrap();
     frame_where(&mut subscriber, number(&reply), |_| (), |frame| frame.vsls.len() == 1);
+    // What is not saved: it stays as it was set all the same.
+    let reply = client.request(&torch(json!({ "power_w": 15 })), PATIENCE).unwrap();
+    let dimmed = frame_where(&mut subscriber, number(&reply), |_| (), |_| true);
     number(&client.request(&Request::SaveVpls {}, PATIENCE).unwrap());
     let saved = std::fs::read_to_string(&file).unwrap();
     assert!(saved.starts_with("# Mine.") && saved.contains("position_m = [0.25, -2.0, 0.0]"), "{saved}");
@@ -177,6 +180,18 @@ fn configs_change_methods_and_take_edits() {
     let reloaded = |frame: &VslFrame| frame.config_generation > few.config_generation;
     let after = frame_where(&mut subscriber, 1, |_| (), reloaded);
     assert_eq!((after.vsls.len(), after.vsls[0].position), (1, [0.25, -2.0, 0.0]));
+    assert_eq!(flux(&after), flux(&dimmed));
+    assert!(
+        after.scene_text.contains("0.25") && !dimmed.scene_text.contains("0.25"),
+        "who attaches now knows of it"
+    );
+    // Whoever changes the file afterwards has what it says, and that alone.
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("0.25", "0.125")).unwrap();
+    let anew = |frame: &VslFrame| frame.config_generation > after.config_generation;
+    let anew = frame_where(&mut subscriber, 1, |_| (), anew);
+    assert_eq!(anew.vsls[0].position, [0.125, -2.0, 0.0]);
+    assert!(anew.vsls[0].flux[0] > 1.5 * after.vsls[0].flux[0], "the torch has its power again");
     service.end();
 }
 

@@ -1,13 +1,13 @@
 //! Turns what edits have made of VPLs, blockers and proxies into the file that the scene comes from.
 
 use super::Director;
-use crate::service::ConfigSource;
-use photonstream_protocol::Reply;
-use photonstream_scene::{SceneError, VplSet, is_model};
+use crate::service::{ConfigSource, placements::Wanted};
+use photonstream_protocol::{Reply, monotonic_ns};
+use photonstream_scene::{Scene, SceneError, VplSet, is_model};
 use std::{
     io,
     path::{Path, PathBuf},
-    sync::atomic::Ordering,
+    sync::{Arc, atomic::Ordering},
 };
 
 /// Why nothing was saved.
@@ -40,8 +40,8 @@ fn has_attached(set: &VplSet) -> bool {
 }
 
 impl Director {
-    /// Writes the present tables into the config. The watcher finds the same scene there, as a config that has changed.
-    pub(super) fn save_vpls(&self) -> Reply {
+    /// Writes the present tables into the config. The watcher finds them there, and [`Director::take_saved`] follows.
+    pub(super) fn save_vpls(&mut self) -> Reply {
         let Some(file) = &self.config_file else {
             let remedy = "write one by `photonstream config MODEL > scene.toml`, and simulate that";
             return Reply::error(
@@ -54,20 +54,48 @@ impl Director {
             return Reply::error("unsupported", reason);
         }
         match self.save_into(&file.path) {
-            Ok(()) => Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) },
+            Ok(text) => {
+                self.saved = Some(text);
+                Reply::Ok { frame: self.latest_frame.load(Ordering::Acquire) }
+            }
             Err(error @ SaveError::File { .. }) => Reply::error("not-saved", error.to_string()),
             Err(error @ SaveError::Scene(_)) => Reply::error("invalid-value", error.to_string()),
         }
     }
 
-    fn save_into(&self, file: &Path) -> Result<(), SaveError> {
+    /// Whether `text`, found in the config, is what was saved there, and nothing else has changed or is to come.
+    pub(super) fn is_saved(&self, text: &str) -> bool {
+        self.saved.as_deref() == Some(text) && self.still.notice.is_empty() && !self.placements.are_awaited()
+    }
+
+    /// Goes on with what was saved as the config: `loaded` from there, it differs from the config before by its VPLs,
+    /// blockers and proxies alone, and all other edits stay as they are.
+    pub(super) fn take_saved(&mut self, loaded: &Scene) {
+        self.saved = None;
+        self.loaded_hash = loaded.hash;
+        let mut scene = Scene::clone(&self.simulation.scene);
+        (scene.resolved_text, scene.hash) = (loaded.resolved_text.clone(), loaded.hash);
+        scene.vpls = Arc::clone(&loaded.vpls);
+        if !self.simulation.has_lights_of(&scene) {
+            // What was edited since leaves `auto` another choice.
+            self.placements.append(Wanted::version(scene, monotonic_ns(), Some(self.animated_s)));
+            return self.place();
+        }
+        let mut still = self.still.next(&scene);
+        still.config_generation += 1;
+        let simulation = self.simulation.with_scene(Arc::new(scene));
+        self.go_on(simulation, still, monotonic_ns());
+    }
+
+    /// Writes the file, and returns what it says now.
+    fn save_into(&self, file: &Path) -> Result<String, SaveError> {
         let failed = |source| SaveError::File { file: file.to_owned(), source };
         // A link stays one: what it leads to is replaced.
         let target = file.canonicalize().map_err(failed)?;
         let text = std::fs::read_to_string(&target).map_err(failed)?;
         let written = self.simulation.scene.vpls.written_into(&text, file)?;
         if written == text {
-            return Ok(());
+            return Ok(written);
         }
         let permissions = std::fs::metadata(&target).map_err(failed)?.permissions();
         // Whole or not at all: whoever reads it meanwhile reads the old one.
@@ -79,6 +107,7 @@ impl Director {
             // Nothing is left where it can be helped.
             let _ = std::fs::remove_file(&beside);
             failed(source)
-        })
+        })?;
+        Ok(written)
     }
 }

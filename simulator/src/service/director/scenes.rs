@@ -4,7 +4,7 @@
 //! the present one goes on; whoever asked for it is answered then. A config replaces what was dragged or set before it was
 //! read. What is edited from then on is edited in the present scene at once, and in those to come where they have
 //! something of that name; an edit that itself needs other lights, and those that come in the same instant, in those to
-//! come alone.
+//! come alone. VPLs that the simulator saved itself replace nothing else.
 
 use super::Director;
 use crate::{
@@ -82,13 +82,18 @@ impl Director {
     pub(super) fn hear(&mut self, news: News) {
         match news {
             // As loaded it is what is simulated already, or will be: edits since then stay.
-            News::Scene(scene) if scene.hash == self.loaded_hash => {
+            News::Scene(scene, _) if scene.hash == self.loaded_hash => {
                 if !self.still.notice.is_empty() {
                     tracing::info!("the config is again what is simulated");
                     self.tell_all("");
                 }
             }
-            News::Scene(scene) => {
+            News::Scene(scene, Some(text)) if self.is_saved(&text) => {
+                tracing::info!("the config has the VPLs that were saved into it; other edits go on");
+                self.take_saved(&scene);
+            }
+            News::Scene(scene, _) => {
+                self.saved = None;
                 tracing::info!("the config has changed: it is simulated as soon as its lights are placed");
                 self.want_config(*scene, None);
             }
@@ -231,7 +236,7 @@ impl Director {
         self.go_on(simulation, still, received_ns)
     }
 
-    fn go_on(&mut self, simulation: Simulation, still: Still, received_ns: u64) -> Reply {
+    pub(super) fn go_on(&mut self, simulation: Simulation, still: Still, received_ns: u64) -> Reply {
         self.go_on_with(simulation, still, Asked::At(received_ns))
     }
 

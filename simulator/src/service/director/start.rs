@@ -139,6 +139,7 @@ impl Director {
             clock: scenes::clock(&scene),
             animated_s: 0.0,
             config_file: options.config.as_ref().and_then(saving::writable),
+            saved: None,
             loaded_hash: scene.hash,
             animation_error: String::new(),
             news,

@@ -182,8 +182,9 @@ fn the_newest_wins() {
     let order = directed.order();
     assert_eq!(order.scene.streaming.vsls, 110);
     // A config wins over settings, and settings go into a config that is to come.
-    let hear =
-        |directed: &mut Directed, scene| directed.director.handle(Event::News(News::Scene(Box::new(scene))));
+    let hear = |directed: &mut Directed, scene| {
+        directed.director.handle(Event::News(News::Scene(Box::new(scene), None)))
+    };
     hear(&mut directed, scene("[light.other]\npower_w = 2\npoint = { position_m = [0, 0.9, 0] }", 120, ""));
     let fourth = directed.ask(json!({ "type": "set_streaming", "values": { "pool_paths": 2000 } }));
     assert!(order.cancel.is_cancelled());
@@ -209,7 +210,7 @@ fn edits_meet_a_config_that_is_to_come() {
     let mut directed = start("edits", scene(crate_, 80, ""));
     directed.accept(set_light("lamp", 7.0));
     directed.accept(move_object("ball", json!({ "position_m": [0.1, 0, 0] })));
-    directed.director.handle(Event::News(News::Scene(Box::new(scene(lamp, 80, "")))));
+    directed.director.handle(Event::News(News::Scene(Box::new(scene(lamp, 80, "")), None)));
     let order = directed.order();
     // In both, in the present one alone, in the next one alone, in none.
     directed.accept(move_object("ball", json!({ "position_m": [0, 0.2, 0] })));
