@@ -78,10 +78,49 @@ pub(super) fn lights(scene: &Scene, point: &Point) -> Result<(VslSet, usize, f64
     Ok((vsls_of(&few)?, few.shining(), times[UPDATES / 2] * 1e-3))
 }
 
-/// The lights of a whole pool in `scene`, a version of that of `base`.
+/// The lights of a whole pool in `scene`, a version of that of `base`: the same ones, unless something has another size.
 pub(crate) fn streamed(
     base: &photonstream_simulator::simulation::Simulation,
     scene: Scene,
 ) -> Result<VslSet, EvaluateError> {
-    photon_streaming::lights_of(&base.with_scene(Arc::new(scene))).map(|(vsls, _)| vsls)
+    let scene = Arc::new(scene);
+    let version = if base.has_lights_of(&scene) { base.with_scene(scene) } else { base.reloaded(scene) };
+    photon_streaming::lights_of(&version).map(|(vsls, _)| vsls)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use photonstream_scene::SceneConfig;
+    use photonstream_simulator::simulation::Simulation;
+    use std::path::Path;
+
+    /// While a box over a floor grows, the lights are those of a simulation that begins with it in that size.
+    #[test]
+    fn what_changes_its_size_has_lights_of_that_size() {
+        let scene = SceneConfig::from_text(
+            "camera = { position_m = [0, 1, 4], target_m = [0, 1, 0], vertical_fov_deg = 40 }\n\
+             origin_m = [0, 0, 0]\nmaterial.m.albedo = 0.5\n\
+             object.floor = { material = \"m\", quad = { corner_m = [-4, 0, 4], edge_u_m = [8, 0, 0], edge_v_m = [0, 0, -8] } }\n\
+             object.crate = { material = \"m\", position_m = [0, 1, 0], box = { size_m = [1, 1, 1] } }\n\
+             light.l = { power_w = 9, point = { position_m = [0, 4, 0] } }\n\
+             streaming = { vsls = 60, pool_paths = 512 }\n\
+             animation = [{ object = \"crate\", property = \"scale\", times_s = [0, 1], values = [1, 1.5] }]\n",
+            Path::new("scene.toml"),
+        )
+        .unwrap()
+        .build()
+        .unwrap();
+        let base = Simulation::new(Arc::new(scene.clone()));
+        for time_s in [0.0, 0.5, 1.0] {
+            let mut edit = scene.edit();
+            scene.animation.apply(time_s, &mut edit).unwrap();
+            let now = edit.finish();
+            let (of_size, _) = photon_streaming::lights_of(&Simulation::new(Arc::new(now.clone()))).unwrap();
+            let streamed = streamed(&base, now).unwrap();
+            assert!(streamed == of_size, "{time_s} s");
+        }
+    }
 }
