@@ -1,7 +1,7 @@
 //! Checks that every scene in `configs/` loads, resolves to itself, and shows its camera reflecting sides.
 #![allow(clippy::unwrap_used)]
 
-use photonstream_scene::{AssetRoots, Scene, Side, bvh::Ray};
+use photonstream_scene::{AssetRoots, Method, Scene, SceneConfig, Side, bvh::Ray};
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -92,5 +92,18 @@ fn cameras_see_reflecting_sides() {
             assert!(object.sides.contains(side), "{name}: {side:?} of {}", object.name);
         }
         assert!(hits > 64 * 48 * 95 / 100, "{name}: {hits} hits");
+    }
+}
+
+/// VPLs that are placed by hand lie on the surfaces that they light, or above them, where shadow rays find them.
+#[test]
+fn hand_made_vpls_are_not_buried() {
+    for name in ["cell.toml", "ruins.toml", "spindle.toml", "road.toml", "door-room.toml"] {
+        let path = folder().join(name);
+        let mut config = SceneConfig::from_file(&path).unwrap();
+        config.streaming.method = Some(Method::StaticVpl);
+        let scene = config.build().unwrap();
+        let buried = scene.notices.iter().find(|notice| notice.contains("below"));
+        assert!(scene.vpls.vpls.len() > 20 && buried.is_none(), "{name}: {buried:?}");
     }
 }

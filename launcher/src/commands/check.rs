@@ -6,7 +6,7 @@ use crate::{
     output::{self, grouped},
 };
 use photonstream_scene::{Method, Scene, SceneConfig, features::Decision};
-use photonstream_simulator::{few_lights, method};
+use photonstream_simulator::{cli::Overrides, few_lights, method};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -20,6 +20,9 @@ JSON: { \"scene\", \"scene_hash\", \"objects\", \"triangles\", \"materials\", \"
 pub(crate) struct Args {
     /// Scene file or model
     pub(crate) config: PathBuf,
+    /// Settings that override the config's: what `simulate` and `run` would do with them
+    #[command(flatten)]
+    pub(crate) overrides: Overrides,
 }
 
 #[derive(Serialize)]
@@ -71,7 +74,7 @@ impl Feature {
 }
 
 pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
-    let scene = SceneConfig::from_file(&args.config)?.build()?;
+    let scene = args.overrides.apply(SceneConfig::from_file(&args.config)?)?.build()?;
     output::report(global.json, &report(&scene), text)
 }
 

@@ -53,7 +53,7 @@ pub(crate) struct Args {
     /// Points explored from each start
     #[arg(long, value_name = "N", default_value_t = VplPlacementSettings::default().explore)]
     explore: u32,
-    /// How far VPLs are drawn back into their surface; negative: lifted off it
+    /// How far VPLs are drawn back into their surface, where shadow rays do not find them; negative: lifted off it
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, default_value_t = VplPlacementSettings::default().normal_bias_m)]
     normal_bias_m: f64,
     /// Seed of exploration and paths

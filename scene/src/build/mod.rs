@@ -1,5 +1,6 @@
 //! Turns a [`SceneConfig`] into a [`Scene`]: validates every value, imports, bakes, names and hashes.
 
+mod buried;
 mod camera;
 mod imported;
 mod imported_cameras;
@@ -173,6 +174,7 @@ impl SceneConfig {
         };
         let vsl_area_m2 = scene.reflecting_area_m2() / scene.streaming.vsls.max(1) as f64;
         texturing::choose_levels(&mut scene, vsl_area_m2 as f32);
+        scene.notices.extend(buried::notice(&scene));
         Ok(scene)
     }
 }

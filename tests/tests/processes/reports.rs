@@ -57,6 +57,13 @@ fn json_reports_have_their_documented_keys() {
         ),
     );
     has_keys(&check["decisions"][0], &keys("what modelled reason"));
+    // Like all commands that take a scene: with other settings.
+    let cell = config("cell.toml");
+    let methods = ["static-vpl", "phantom-vpl"].map(|method| {
+        let check = ground.json(&["check", &cell, "--method", method, "--json"]);
+        (check["method"].as_str() == Some(method), check["published_lights"].as_u64().unwrap())
+    });
+    assert!(methods[0].0 && methods[1].0 && methods[0].1 > methods[1].1, "{methods:?}");
 
     let render = ground
         .json(&[&["render", &scene, "--out", "r.exr", "--size", "12x8", "--json"], &small[..]].concat());
