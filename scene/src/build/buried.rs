@@ -1,20 +1,6 @@
 //! Turns predefined VPLs that lie below the surface they stand for into a notice: shadow rays to them end in the dark.
 
-use crate::{
-    bvh::Ray,
-    scene::{Scene, Side, Sides},
-    settings::Method,
-    vpls::moved_normal,
-};
-
-/// A surface is looked for up to so far above a VPL, relative to the radius of the scene.
-const DEEPEST: f32 = 5e-2;
-
-/// The same for what reflects on both sides: farther above, it may as well be a leaf or a cloth over the VPL's own surface.
-const DEEPEST_BELOW_SHEETS: f32 = 1e-3;
-
-/// What is not so far below its surface is on it, up to roundings.
-const ON_SURFACE: f32 = 2e-6;
+use crate::{scene::Scene, settings::Method, vpls::moved_normal};
 
 /// What to tell of VPLs that lie below a surface which reflects to where their normals point, where the method needs VPLs.
 pub(super) fn notice(scene: &Scene) -> Option<String> {
@@ -41,14 +27,7 @@ fn depth_m(scene: &Scene, index: usize) -> Option<f32> {
     let map = scene.world_from_anchor(vpl.object);
     let origin = map.transform_point3(vpl.position).as_vec3();
     let direction = moved_normal(&map.matrix3, vpl.normal).as_vec3();
-    let radius = scene.bounds.radius;
-    let hit = scene.bvh.closest(&Ray { origin, direction, t_max: DEEPEST * radius })?;
-    let front = scene.geometry.normals[hit.triangle as usize];
-    let lit = if front.dot(direction) > 0.0 { Side::Front } else { Side::Back };
-    let sides = scene.objects[scene.geometry.object_of[hit.triangle as usize].0 as usize].sides;
-    let deepest = if sides == Sides::Both { DEEPEST_BELOW_SHEETS } else { DEEPEST };
-    let is_below = sides.contains(lit) && (ON_SURFACE * radius..deepest * radius).contains(&hit.t);
-    is_below.then_some(hit.t)
+    scene.depth_below_surface(origin, direction)
 }
 
 #[cfg(test)]

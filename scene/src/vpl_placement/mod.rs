@@ -113,7 +113,7 @@ pub fn place_vpls(
     kept.truncate(settings.most as usize);
     let bases = bases(&reflections, &found, &of);
     let mut vpls: Vec<PlacedVpl> =
-        kept.iter().map(|&i| placed(&found[i as usize], &bases[i as usize])).collect();
+        kept.iter().map(|&i| placed(scene, &found[i as usize], &bases[i as usize])).collect();
     vpls.sort_by_key(|vpl| (vpl.object, std::cmp::Reverse(vpl.population)));
     if settings.weights == PlacedWeights::Surface {
         let own = vpls.iter().map(|vpl| Share {
@@ -188,12 +188,13 @@ fn bases(reflections: &[Reflection], clusters: &[Cluster], of: &[u32]) -> Vec<Re
     bases.into_iter().map(|base| *base.expect("invariant: every cluster has a reflection").1).collect()
 }
 
-/// The VPL of a cluster: at its mean, moved along its normal as high as the reflection nearest to it, so that it lies
-/// on curved surfaces and not behind them.
-fn placed(cluster: &Cluster, base: &Reflection) -> PlacedVpl {
+/// The VPL of a cluster: at its mean, moved along its normal as high as the reflection nearest to it, and out of what it
+/// lies in all the same, so that it is on curved surfaces and not behind them.
+fn placed(scene: &Scene, cluster: &Cluster, base: &Reflection) -> PlacedVpl {
     let (mean, normal) = (cluster.position(), cluster.normal());
+    let position = mean + normal * (base.position - mean).dot(normal);
     PlacedVpl {
-        position: mean + normal * (base.position - mean).dot(normal),
+        position: scene.raised_onto_surface(position, normal),
         normal,
         albedo: cluster.albedo(),
         area_m2: None,
