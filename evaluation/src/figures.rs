@@ -173,18 +173,34 @@ mod tests {
     use photonstream_scene::SceneConfig;
     use std::path::Path;
 
-    /// The door room has all figures but those of spots; closed, the room has no light, open it has.
-    #[test]
-    fn a_scene_with_blockers_has_its_figures() {
+    /// The figures of the door room, with a reference of the moment `time_s`, 32 × 24 pixels of 16 paths.
+    fn figures_at(time_s: f64) -> Vec<Figure> {
         let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/door-room.toml");
-        let mut scene = SceneConfig::from_file(&config).unwrap().build().unwrap();
-        let animation = std::mem::take(&mut scene.animation);
+        let config = SceneConfig::from_file(&config).unwrap();
+        let animation = config.clone().build().unwrap().animation;
+        let mut scene = config.at(time_s).unwrap().build().unwrap();
+        scene.animation = Arc::default();
         let scene = Arc::new(scene);
         let folder = tempfile::tempdir().unwrap();
         let truth = truth(&scene, (32, 24), 16, folder.path(), Watch::default()).unwrap();
         let bench = Bench::new(Arc::clone(&scene), (32, 24));
         let base = Point::of_scene(&scene, 1);
-        let figures = figures(&bench, &base, (&animation, 0.0), &truth, Watch::default()).unwrap();
+        figures(&bench, &base, (&animation, time_s), &truth, Watch::default()).unwrap()
+    }
+
+    /// A reference of the open door says how wrong the picture of that moment is, and of no other.
+    #[test]
+    fn errors_are_of_the_moment_of_the_reference() {
+        let figures = figures_at(5.0);
+        let door = figures.iter().find(|figure| figure.title.starts_with("Figure 10")).unwrap();
+        let has_errors: Vec<bool> = door.shots.iter().map(|shot| shot.errors.is_some()).collect();
+        assert_eq!(has_errors, [false, false, false, true], "at 0, 1.5, 2.5 and 5 s");
+    }
+
+    /// The door room has all figures but those of spots; closed, the room has no light, open it has.
+    #[test]
+    fn a_scene_with_blockers_has_its_figures() {
+        let figures = figures_at(0.0);
         let titles: Vec<_> = figures.iter().map(|f| f.title.split(':').next().unwrap()).collect();
         assert_eq!(titles, ["Figure 4", "Figure 5", "Figure 6", "Figure 10", "Figure 12"]);
         let door = &figures[3].shots;
