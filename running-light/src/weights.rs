@@ -24,7 +24,8 @@ pub fn automatic_weights(vpls: &mut [Vpl], area_per_weight: f32) {
 /// The same a little at a time, for VPLs that move: one comparison for each call.
 ///
 /// It belongs to its set of VPLs, not to a light, and is stepped once for each update of the set whatever the number
-/// of lights. N VPLs that stand still have the weights of [`automatic_weights`], bit for bit, after N² steps.
+/// of lights. N VPLs that stand still have the weights of [`automatic_weights`], bit for bit, after N² steps from the
+/// beginning of a pass, and after [`AmortisedWeights::steps_until_whole`] where they have moved in the middle of one.
 ///
 /// Source: paper B §5.1.
 #[derive(Clone, Debug)]
@@ -44,6 +45,13 @@ impl AmortisedWeights {
     /// At the beginning of a pass.
     pub const fn new() -> Self {
         Self { current: 0, other: 0, nearest_sq: f32::INFINITY }
+    }
+
+    /// Steps after which `vpls` VPLs that stand still from now on have the weights of [`automatic_weights`]: N², and before
+    /// them what is left of a comparison that has begun, at most N − 1.
+    pub const fn steps_until_whole(&self, vpls: usize) -> usize {
+        let begun = self.other > 0 && self.other < vpls && self.current < vpls;
+        vpls * vpls + if begun { vpls - self.other } else { 0 }
     }
 
     /// Compares one pair of VPLs; at each N-th step one weight is set. A set that has become shorter starts anew.

@@ -1,6 +1,5 @@
 //! Turns a [`SceneConfig`] into a [`Scene`]: validates every value, imports, bakes, names and hashes.
 
-mod buried;
 mod camera;
 mod imported;
 mod imported_cameras;
@@ -14,6 +13,7 @@ mod objects;
 mod settings;
 pub(crate) mod sky;
 mod steady_state;
+mod vpl_flaws;
 pub(crate) mod vpls;
 
 use crate::{
@@ -174,7 +174,8 @@ impl SceneConfig {
         };
         let vsl_area_m2 = scene.reflecting_area_m2() / scene.streaming.vsls.max(1) as f64;
         texturing::choose_levels(&mut scene, vsl_area_m2 as f32);
-        scene.notices.extend(buried::notice(&scene));
+        let flaws = vpl_flaws::notices(&scene);
+        scene.notices.extend(flaws);
         Ok(scene)
     }
 }

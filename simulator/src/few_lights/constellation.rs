@@ -26,7 +26,7 @@ pub(super) struct Constellation {
     blockers: Vec<Blocker>,
     amortised: AmortisedWeights,
     /// Comparisons until all weights are those of the present places.
-    steps_left: u64,
+    steps_left: usize,
     of: Option<(Arc<VplSet>, Arc<Geometry>)>,
     has_changed: bool,
 }
@@ -46,18 +46,22 @@ impl Constellation {
         self.has_changed = false;
         let settings = &scene.vpls.settings;
         if !is_same {
-            let is_first = self.of.is_none();
-            self.of = Some((Arc::clone(&scene.vpls), Arc::clone(&scene.geometry)));
+            let last = self.of.replace((Arc::clone(&scene.vpls), Arc::clone(&scene.geometry)));
             let before = std::mem::take(&mut self.vpls);
             self.place(scene, &before);
             self.has_changed = self.vpls != before;
-            let is_elsewhere = is_first || !self.are_where(&before);
+            let is_weighed_alike = last.is_some_and(|(last, _)| are_weighed_alike(&last, &scene.vpls));
             // Where all are given, or nothing has come closer, there is nothing to compare.
-            let are_due = is_elsewhere && scene.vpls.vpls.iter().any(|vpl| vpl.weight.is_none());
+            let are_due = !(is_weighed_alike && self.are_where(&before));
             match settings.weights {
-                _ if !are_due => {}
-                Weights::Amortised if !is_first => self.steps_left = (self.vpls.len() as u64).pow(2),
-                _ => automatic_weights(&mut self.vpls, settings.area_per_weight),
+                _ if !(are_due && scene.vpls.vpls.iter().any(|vpl| vpl.weight.is_none())) => {}
+                Weights::Amortised if is_weighed_alike => {
+                    self.steps_left = self.amortised.steps_until_whole(self.vpls.len());
+                }
+                _ => {
+                    automatic_weights(&mut self.vpls, settings.area_per_weight);
+                    (self.amortised, self.steps_left) = (AmortisedWeights::new(), 0);
+                }
             }
         } else if self.steps_left == 0 {
             return;
@@ -136,6 +140,14 @@ impl Constellation {
             Blocker::new(map.transform_point3(blocker.centre).as_vec3(), blocker.radius)
         }));
     }
+}
+
+/// Whether two sets have as many VPLs, which have or lack weights alike, in the same unit.
+fn are_weighed_alike(a: &VplSet, b: &VplSet) -> bool {
+    let are_given = |set: &VplSet| set.vpls.iter().map(|vpl| vpl.weight.is_some()).collect::<Vec<_>>();
+    a.settings.area_per_weight == b.settings.area_per_weight
+        && a.settings.weights == b.settings.weights
+        && are_given(a) == are_given(b)
 }
 
 /// A virtual light as a place that reflects: what a second bounce is made from.

@@ -6,6 +6,7 @@
 mod axis;
 mod constellation;
 mod maps;
+mod nearest;
 mod photons;
 mod sources;
 #[cfg(test)]
@@ -168,7 +169,8 @@ impl FewLights {
         let settings = &scene.vpls.settings;
         let sources = sources::of(scene);
         let is_phantom = |source: &Source| has_phantoms && source.spot.is_some();
-        let statics: Vec<&Source> = sources.iter().filter(|source| !is_phantom(source)).collect();
+        let is_static = |source: &&Source| !is_phantom(source) && !source.samples.is_empty();
+        let statics: Vec<&Source> = sources.iter().filter(is_static).collect();
         let mut second: Vec<Shown> = Vec::new();
         if !statics.is_empty() {
             self.light_statics(scene, &statics, lights, &mut second);
@@ -293,16 +295,16 @@ pub fn is_of_few_lights(method: Method) -> bool {
 
 /// The number of lights of a method of few lights in any version of a scene.
 pub fn count(scene: &Scene, method: Method) -> usize {
-    let second = if second_bounce(&scene.vpls.settings).is_some() { scene.lights.len() } else { 0 };
     let spots = scene.lights.iter().filter(|light| is_spot(light)).count();
-    let first = match method {
-        Method::StaticVpl if !scene.lights.is_empty() => scene.vpls.vpls.len(),
-        Method::PhantomVpl if spots < scene.lights.len() => scene.vpls.vpls.len() + spots,
-        Method::PhantomVpl => spots,
-        Method::InstantRadiosity => photons::counts(scene).iter().sum::<u32>() as usize,
-        _ => 0,
+    let lights_of_vpls = scene.lights.iter().filter(|light| sources::lights_vpls(light)).count();
+    let (first, sources) = match method {
+        Method::StaticVpl if lights_of_vpls > 0 => (scene.vpls.vpls.len(), lights_of_vpls),
+        Method::PhantomVpl if lights_of_vpls > spots => (scene.vpls.vpls.len() + spots, lights_of_vpls),
+        Method::PhantomVpl => (spots, spots),
+        Method::InstantRadiosity => (photons::counts(scene).iter().sum::<u32>() as usize, scene.lights.len()),
+        _ => (0, 0),
     };
-    first + second
+    first + if second_bounce(&scene.vpls.settings).is_some() { sources } else { 0 }
 }
 
 /// A regular octagon of a light's area around it, counter-clockwise as its lit side sees it.

@@ -4,18 +4,16 @@
 //! same from update to update, so that a still scene has still light. Deviates: directions are low-discrepancy samples of
 //! the lights' own profiles instead of uniform random ones.
 
-use super::{Shown, constellation::as_vpl};
+use super::{Shown, nearest};
 use crate::{apportion::apportion, emitters::watts, streams::stream_of};
+use core::f32::consts::PI;
 use glam::Vec3;
-use photonstream_running_light::{VirtualLight, automatic_weights};
+use photonstream_running_light::VirtualLight;
 use photonstream_scene::{Detail, ObjectId, Scene, Side, bvh::Ray};
 use photonstream_shading::{sobol::Sequence, surface};
 
 /// The stream of directions.
 const STREAM: u32 = 0x1b6;
-
-/// Beyond so many lights their areas are equal shares of all surfaces: comparing all with all takes too long.
-const MOST_COMPARED: usize = 4096;
 
 /// The photons of each light: equal shares of the scene's number of them, at least one. A light that is dimmed keeps them.
 pub(super) fn counts(scene: &Scene) -> Vec<u32> {
@@ -66,15 +64,11 @@ fn meet(scene: &Scene, origin: Vec3, direction: Vec3, flux: Vec3) -> Option<Show
 pub(super) fn give_areas(scene: &Scene, lights: &mut [Shown]) {
     let shining: Vec<usize> =
         (0..lights.len()).filter(|&index| lights[index].light.flux != Vec3::ZERO).collect();
-    let share = scene.reflecting_area_m2() / shining.len().max(1) as f64;
-    if shining.len() > MOST_COMPARED {
-        shining.iter().for_each(|&index| lights[index].light.area = share as f32);
-        return;
-    }
-    let mut vpls: Vec<_> = shining.iter().map(|&index| as_vpl(&lights[index].light)).collect();
-    automatic_weights(&mut vpls, 1.0);
-    for (&index, vpl) in shining.iter().zip(&vpls) {
-        // Those that coincide have no disc.
-        lights[index].light.area = if vpl.weight > 0.0 { vpl.weight } else { share as f32 };
+    let places: Vec<Vec3> = shining.iter().map(|&index| lights[index].light.position).collect();
+    let share = (scene.reflecting_area_m2() / shining.len().max(1) as f64) as f32;
+    for (&index, distance_sq) in shining.iter().zip(nearest::squared_distances(&places)) {
+        let disc = PI * 0.25 * distance_sq;
+        // One alone has no disc, nor have those that coincide.
+        lights[index].light.area = if disc > 0.0 && disc.is_finite() { disc } else { share };
     }
 }

@@ -1,6 +1,7 @@
 //! Turns a scene's lights into those of `running-light`.
 
 use core::f32::consts::FRAC_1_PI;
+use glam::Vec3;
 use photonstream_running_light::{Light, Spot};
 use photonstream_scene::{Scene, SceneLight};
 use photonstream_shading::{LightShape, light::Bounds, sobol::Sequence};
@@ -27,7 +28,12 @@ pub(crate) fn is_spot(light: &SceneLight) -> bool {
     matches!(light.light.shape, LightShape::Spot { .. })
 }
 
-/// The lights of a scene, in their order. A sky lights no VPL.
+/// Whether a light lights VPLs: all but a sky do.
+pub(crate) fn lights_vpls(light: &SceneLight) -> bool {
+    !matches!(light.light.shape, LightShape::Sky { .. })
+}
+
+/// The lights of a scene, in their order. A sky has no samples.
 pub(super) fn of(scene: &Scene) -> Vec<Source> {
     scene.lights.iter().map(|light| source(light, scene.bounds)).collect()
 }
@@ -44,30 +50,35 @@ fn source(light: &SceneLight, bounds: Bounds) -> Source {
             Source { spot: Some(spot), ..single(Light::Spot(spot)) }
         }
         LightShape::Sky { .. } => {
-            let whole = Light::Directional { direction: glam::Vec3::NEG_Y, irradiance: glam::Vec3::ZERO };
+            let whole = Light::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ZERO };
             Source { spot: None, samples: Vec::new(), whole }
         }
         ref shape @ (LightShape::Mesh { .. }
         | LightShape::Parallelogram { .. }
         | LightShape::Triangle { .. }) => {
             let sequence = Sequence::new(0, STREAM);
-            let piece = power / POINTS as f32;
-            let samples: Vec<Light> = (0..POINTS)
-                .map(|index| {
-                    let u = sequence.sample(index.into()).next_2d();
-                    match shape {
-                        LightShape::Mesh { mesh } => {
-                            let place = mesh.place(u);
-                            Light::emitter(place.point, place.normal, piece)
-                        }
-                        _ => {
-                            let origin = shape.emit_with(bounds, [0.5; 2], u).origin;
-                            Light::emitter(origin, shape.emitter_normal(), piece)
-                        }
+            let place = |index: u32| {
+                let u = sequence.sample(index.into()).next_2d();
+                match shape {
+                    LightShape::Mesh { mesh } => {
+                        let place = mesh.place(u);
+                        (place.point, place.normal)
                     }
-                })
-                .collect();
-            let whole = samples[0];
+                    _ => (shape.emit_with(bounds, [0.5; 2], u).origin, shape.emitter_normal()),
+                }
+            };
+            let places: Vec<(Vec3, Vec3)> = (0..POINTS).map(place).collect();
+            let piece = power / POINTS as f32;
+            let samples: Vec<Light> =
+                places.iter().map(|&(point, normal)| Light::emitter(point, normal, piece)).collect();
+            let whole = match shape {
+                // Its faces look everywhere: it sends light as a point in its middle does.
+                LightShape::Mesh { .. } => {
+                    let sum: Vec3 = places.iter().map(|&(point, _)| point).sum();
+                    Light::point(sum / POINTS as f32, power)
+                }
+                _ => samples[0],
+            };
             Source { spot: None, samples, whole }
         }
     }

@@ -314,3 +314,137 @@ fn weights_are_left_alone_where_nothing_comes_closer() {
     assert!(!moved(vpl(0.0, "weight = 1") + &vpl(1.0, &format!("weight = 1\n{riding}"))), "all are given");
     assert!(moved(vpl(0.0, "") + &vpl(1.0, riding)));
 }
+
+/// Three VPLs, one of which is carried past the others in 1 to 12 updates and then rests: amortised weights come to rest as
+/// whole ones, after N² updates and at most N − 1 that were begun, whatever moment of a pass that is.
+#[test]
+fn amortised_weights_come_to_rest_after_any_motion() {
+    let vpl = |x: f32, more: &str| {
+        format!("[[vpl]]\nposition_m = [{x}, 0, 0]\nnormal = [0, 1, 0]\nalbedo = 0.5\n{more}\n")
+    };
+    let vpls = vpl(0.0, "") + &vpl(1.0, "") + &vpl(3.0, "object = \"crate\"");
+    let first = static_scene(POINT, &format!("vpls.weights = \"amortised\"\n{vpls}"));
+    for moves in 1..=12 {
+        let mut few = FewLights::new(&first, Method::StaticVpl);
+        few.update(&first, 0.0);
+        let mut scene = first.clone();
+        for i in 0..moves {
+            // Close by at first, far away at the end.
+            let x = if i + 1 == moves { 3.7 } else { 0.6 + 0.01 * i as f32 };
+            let mut edit = scene.edit();
+            let to = serde_json::json!({ "position_m": [x, 0.5, 0] });
+            edit.move_object("crate", to.as_object().unwrap()).unwrap();
+            scene = edit.finish();
+            few.update(&scene, 0.01);
+        }
+        let updates = (0..100)
+            .take_while(|_| {
+                few.is_following() && {
+                    few.update(&scene, 0.01);
+                    true
+                }
+            })
+            .count();
+        assert!(updates < 9 + 3, "{moves}: {updates}");
+        let areas = |few: &FewLights| few.lights().iter().map(|shown| shown.light.area).collect::<Vec<_>>();
+        let mut whole = FewLights::new(&scene, Method::StaticVpl);
+        whole.update(&scene, 0.0);
+        assert_eq!(areas(&few), areas(&whole), "{moves}");
+    }
+}
+
+/// Automatic weights are discs in any unit of weight, and of what had a weight of its own before: π/4 m² for two VPLs at 1 m.
+#[test]
+fn other_settings_have_weights_of_their_own() {
+    let vpl = |x: f32, more: &str| {
+        format!("[[vpl]]\nposition_m = [{x}, 0, 0]\nnormal = [0, 1, 0]\nalbedo = 0.5\n{more}\n")
+    };
+    for weights in ["whole", "amortised"] {
+        let tables = vpl(0.0, "weight = 50") + &vpl(1.0, "");
+        let mut scene = static_scene(POINT, &format!("vpls.weights = \"{weights}\"\n{tables}"));
+        let mut few = FewLights::new(&scene, Method::StaticVpl);
+        few.update(&scene, 0.0);
+        let free =
+            |x: f64| serde_json::json!({ "position_m": [x, 0, 0], "normal": [0, 1, 0], "albedo": 0.5 });
+        let edits = [
+            (serde_json::json!({ "vpls": { "area_per_weight_m2": 2 } }), [100.0, PI / 4.0]),
+            (serde_json::json!({ "vpl": [free(0.0), free(1.0)] }), [PI / 4.0; 2]),
+            (serde_json::json!({ "vpls": { "area_per_weight_m2": 0.5 } }), [PI / 4.0; 2]),
+        ];
+        for (values, expected) in edits {
+            let mut edit = scene.edit();
+            edit.set_vpls(values.as_object().unwrap()).unwrap();
+            scene = edit.finish();
+            few.update(&scene, 0.01);
+            let areas: Vec<f32> = few.lights().iter().map(|shown| shown.light.area).collect();
+            let is = areas.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5 * b);
+            assert!(is, "{weights}, {values}: {areas:?}, {expected:?}");
+        }
+    }
+}
+
+/// Areas of photons are discs half way to the closest other one, as comparing all with all has them: 300 on a floor.
+#[test]
+fn photons_have_the_discs_of_automatic_weights() {
+    let scene = scene(&format!("{POINT}\nstreaming.method = \"instant-radiosity\"\nvpls.photons = 300\n"));
+    let shown: Vec<Shown> =
+        updated(&scene).into_iter().filter(|shown| shown.light.flux != Vec3::ZERO).collect();
+    assert!(shown.len() > 50);
+    let mut vpls: Vec<_> = shown.iter().map(|shown| constellation::as_vpl(&shown.light)).collect();
+    photonstream_running_light::automatic_weights(&mut vpls, 1.0);
+    for (shown, vpl) in shown.iter().zip(&vpls) {
+        assert!((shown.light.area / vpl.weight - 1.0).abs() < 1e-6, "{shown:?}, {vpl:?}");
+    }
+}
+
+/// A ball of 80 triangles that emits everywhere has the second bounce of a point in its middle: the mean of 16 of its points
+/// is less than half its radius of 0.3 m beside it, 2 m away from the VPL.
+#[test]
+fn the_second_bounce_of_a_closed_lamp_is_that_of_a_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let corner = |i: u32, j: u32| {
+        let (turn, rise) =
+            (f64::from(j) * 0.25 * std::f64::consts::PI, f64::from(i) / 6.0 * std::f64::consts::PI);
+        let (x, y, z) = (rise.sin() * turn.cos(), rise.cos(), rise.sin() * turn.sin());
+        format!("v {} {} {}\n", 0.3 * x, 0.3 * y, 0.3 * z)
+    };
+    let mut obj = "mtllib ball.mtl\nusemtl lamp\n".to_owned();
+    (0..=6).flat_map(|i| (0..8).map(move |j| (i, j))).for_each(|(i, j)| obj += &corner(i, j));
+    for (i, j) in (0..6).flat_map(|i| (0..8).map(move |j| (i, j))) {
+        let [a, b, c, d] = [(i, j), (i, j + 1), (i + 1, j + 1), (i + 1, j)].map(|(i, j)| i * 8 + j % 8 + 1);
+        // At the poles one of both triangles is a line.
+        obj += &if i < 5 { format!("f {b} {c} {d}\n") } else { String::new() };
+        obj += &if i > 0 { format!("f {a} {b} {d}\n") } else { String::new() };
+    }
+    std::fs::write(folder.path().join("ball.obj"), obj).unwrap();
+    std::fs::write(folder.path().join("ball.mtl"), "newmtl lamp\nKd 0 0 0\nKe 9 9 9\n").unwrap();
+    let of = |light: &str| {
+        let tables = format!("streaming.method = \"static-vpl\"\nvpls.second_bounce_distance_m = 1\n{VPL}");
+        let text = format!("{SCENE}\n{light}\n{tables}");
+        let config = SceneConfig::from_text(&text, &folder.path().join("scene.toml")).unwrap();
+        let scene = config.build().unwrap();
+        assert_eq!(scene.lights.len(), 1);
+        updated(&scene)[1].light
+    };
+    let (closed, point) =
+        (of("object.ball = { position_m = [0, 2, 0], obj = { path = \"ball.obj\" } }"), of(POINT));
+    assert!(closed.flux.x > 0.0 && closed.position.distance(point.position) < 0.15, "{closed:?}, {point:?}");
+    assert_eq!(closed.normal, point.normal);
+}
+
+/// A sky takes no place among the lights of VPLs.
+#[test]
+fn a_sky_has_no_dark_lights() {
+    let sky = "light.s = { sky = { radiance_w_m2_sr = 1 } }\n";
+    let tables = format!("vpls.second_bounce_distance_m = 1\n{VPL}");
+    for (lights, method, expected) in [
+        (sky.to_owned(), "static-vpl", 0),
+        (sky.to_owned(), "phantom-vpl", 0),
+        (format!("{sky}{SPOT}"), "phantom-vpl", 2),
+        (format!("{sky}{SPOT}"), "static-vpl", 2),
+        (format!("{sky}{POINT}"), "phantom-vpl", 2),
+    ] {
+        let scene = scene(&format!("{lights}\nstreaming.method = \"{method}\"\n{tables}"));
+        assert_eq!(updated(&scene).len(), expected, "{lights}, {method}");
+    }
+}
