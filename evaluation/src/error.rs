@@ -32,6 +32,16 @@ pub enum EvaluateError {
     /// Two pictures cannot be compared.
     #[error(transparent)]
     Metrics(#[from] MetricsError),
+    /// A scene without light: nothing can be told of errors relative to it.
+    #[error(
+        "scene {scene}: found a black reference, expected light in the picture, without which relative errors do not exist; {remedy}"
+    )]
+    Black {
+        /// Its name.
+        scene: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// A point to measure cannot be understood.
     #[error("--point {text}: {reason}")]
     Point {

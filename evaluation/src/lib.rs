@@ -27,5 +27,5 @@ pub mod split;
 pub mod truth;
 
 pub use error::EvaluateError;
-pub use evaluate::{Observer, Options, evaluate};
+pub use evaluate::{Observer, Options, SCENE_WITHOUT_LIGHT, evaluate};
 pub use metrics::{Comparison, MetricsError, compare};

@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 use photonstream_evaluation::{
-    EvaluateError, Observer, Options, device, evaluate, hard_cases, plan::Effort, results::Results,
+    EvaluateError, Observer, Options, SCENE_WITHOUT_LIGHT, device, evaluate, hard_cases, plan::Effort,
+    results::Results,
 };
 use std::{
     path::{Path, PathBuf},
@@ -95,6 +96,29 @@ fn from_config_to_page() {
 }
 
 /// The command in a row measures the same picture again.
+/// Behind its closed door the room is black: it is left out, and the other scene is measured; alone it is an error that
+/// says what to do.
+#[test]
+fn a_scene_without_light_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut options = options(folder.path(), &["photon-streaming:vsls=60"]);
+    let ball = options.configs[0].clone();
+    let dark = ball.with_file_name("door-room.toml");
+    options.configs = vec![dark.clone(), ball];
+    let results = run(&options);
+    assert!(results.complete && results.rows.len() == 1 && results.rows[0].scene != "Door room");
+    let told = results.skipped.iter().find(|s| s.what == SCENE_WITHOUT_LIGHT).unwrap();
+    assert!(told.why.contains("Door room") && told.why.contains("--time"), "{told:?}");
+    options.configs = vec![dark];
+    let cancelled = AtomicBool::new(false);
+    let observer = Observer { progress: &|_, _| {}, cancelled: &cancelled };
+    let outcome = evaluate(&options, Err(NO_DEVICE.into()), observer);
+    assert!(matches!(outcome, Err(EvaluateError::Black { .. })), "{outcome:?}");
+    // With the door open it has light.
+    options.time_s = Some(7.0);
+    assert_eq!(run(&options).rows.len(), 1);
+}
+
 #[test]
 fn a_point_is_repeated_by_its_text() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,8 @@ use crate::{
     results::{Results, Skipped},
     truth::truth,
 };
-use photonstream_renderer::Watch;
+use glam::Vec3;
+use photonstream_renderer::{LayerKind, Watch};
 use photonstream_scene::{Scene, SceneConfig};
 use run::Run;
 use std::{
@@ -88,17 +89,27 @@ pub fn evaluate(
     }
     results.hard_cases = CLOSED_FORMS.iter().filter_map(|form| run_closed_form(form.test, SAMPLES)).collect();
     let mut sheets = Vec::new();
-    let mut outcome = Ok(());
+    let (mut outcome, mut black) = (Ok(()), Vec::new());
     for (index, config) in options.configs.iter().enumerate() {
         let count = options.configs.len() as f64;
         let progress = |share: f64, what: &str| {
             (observer.progress)((index as f64 + share) / count, what);
         };
         let observer = Observer { progress: &progress, ..observer };
-        outcome = scene(config, options, &mut device, observer, &mut results, &mut sheets);
+        match scene(config, options, &mut device, observer, &mut results, &mut sheets) {
+            // The others may have light.
+            Err(error @ EvaluateError::Black { .. }) => black.push(error),
+            other => outcome = other,
+        }
         if outcome.is_err() {
             break;
         }
+    }
+    for error in &black {
+        results.skipped.push(Skipped { what: SCENE_WITHOUT_LIGHT.into(), why: error.to_string() });
+    }
+    if outcome.is_ok() && black.len() == options.configs.len() {
+        outcome = black.into_iter().next().map_or(Ok(()), Err);
     }
     results.complete = outcome.is_ok();
     results.seconds = begun.elapsed().as_secs_f64();
@@ -106,6 +117,9 @@ pub fn evaluate(
     report::write(&results, &sheets, &options.out)?;
     outcome.map(|()| results)
 }
+
+/// What is skipped where a scene's picture is black.
+pub const SCENE_WITHOUT_LIGHT: &str = "a scene without light";
 
 /// What no evaluation has.
 fn left_out() -> Vec<Skipped> {
@@ -150,6 +164,14 @@ fn scene(
     let reported = |share: f64| (observer.progress)(0.15 * share, "reference");
     let watch = Watch { progress: Some(&reported), cancelled: Some(observer.cancelled) };
     let truth = truth(&scene, size, spp, &options.cache, watch)?;
+    let full = &truth.film.layer(LayerKind::Full.name())?.pixels;
+    if full.iter().all(|pixel| *pixel == Vec3::ZERO) {
+        let remedy = match animation.is_empty() {
+            true => "give it a light that the camera sees something of",
+            false => "measure a moment that has light by --time SECONDS",
+        };
+        return Err(EvaluateError::Black { scene: scene.name.clone(), remedy });
+    }
     sheets.push(SceneSheet::new(&scene, &truth));
     let threads =
         options.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));

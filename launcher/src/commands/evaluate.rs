@@ -115,6 +115,9 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
             tracing::warn!("{} has what was measured until then", page.display());
         }
     })?;
+    for skipped in results.skipped.iter().filter(|s| s.what == photonstream_evaluation::SCENE_WITHOUT_LIGHT) {
+        tracing::warn!("{}", skipped.why);
+    }
     let report = Report {
         complete: results.complete,
         seconds: results.seconds,
