@@ -1,5 +1,6 @@
 //! Gathers what the methods of few lights know of a scene: predefined virtual point lights, blockers and proxies.
 
+mod align;
 mod buried;
 mod carry;
 mod hull;

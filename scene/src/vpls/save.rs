@@ -1,14 +1,17 @@
 //! Turns a set of VPLs, blockers and proxies, and the text of a config, into the text that says so: all else of it stays,
 //! comments and order, too.
 
-use super::{VplSet, VplTables};
+use super::{
+    VplSet, VplTables,
+    align::{Step, steps},
+};
 use crate::{
     SceneConfig, SceneError,
     config::{Field, ProxyConfig, Vector, VplConfig, VplsConfig},
     settings::PhantomSurfaces,
 };
 use serde::Serialize;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 impl VplSet {
@@ -88,8 +91,7 @@ fn defaults(has_proxies: bool) -> VplsConfig {
     }
 }
 
-/// Entries of an array of tables: those that are the same stay, of the others the first are changed, and what is too many or
-/// too few is taken away or added.
+/// Entries of an array of tables: each becomes what it is most like, and keeps its comments; the others go and come.
 fn write_list<T: Serialize + PartialEq>(document: &mut DocumentMut, name: &str, before: &[T], now: &[T]) {
     if before == now {
         return;
@@ -102,33 +104,90 @@ fn write_list<T: Serialize + PartialEq>(document: &mut DocumentMut, name: &str, 
         *list = Item::ArrayOfTables(tables);
         return;
     };
-    let (mut at, mut old, mut new) = (0, before, now);
-    while let Some((first, rest)) = old.split_first() {
-        match new.split_first() {
-            Some((wanted, left)) if wanted == first => (at, new) = (at + 1, left),
-            // More are there than are wanted.
-            _ if old.len() > new.len() => drop(tables.remove(at)),
-            Some((wanted, left)) => {
-                if let Some(entry) = tables.get_mut(at) {
-                    let (before, wanted) = (table(first), table(wanted));
-                    entry.retain(|key, _| wanted.contains_key(key) || !before.contains_key(key));
-                    // What says the same stays as it is written.
-                    let is_other = |key: &str, value: &Item| {
-                        before.get(key).is_none_or(|before| before.to_string() != value.to_string())
-                    };
-                    let changed = wanted.iter().filter(|(key, value)| is_other(key, value));
-                    changed.for_each(|(key, value)| put(entry, key, value));
+    let written: [Vec<Table>; 2] = [before, now].map(|list| list.iter().map(table).collect());
+    let [before, now] = &written;
+    let (mut at, mut old, mut new) = (0, before.iter(), now.iter());
+    let said = [before, now].map(|list| list.iter().map(Said::by).collect::<Vec<_>>());
+    for step in steps(before.len(), now.len(), |i, j| said[0][i].difference(&said[1][j])) {
+        match step {
+            Step::Keep => {
+                if let (Some(entry), Some(before), Some(wanted)) =
+                    (tables.get_mut(at), old.next(), new.next())
+                {
+                    change(entry, before, wanted);
                 }
-                (at, new) = (at + 1, left);
+                at += 1;
             }
-            None => break,
+            Step::Remove => {
+                tables.remove(at);
+                old.next();
+            }
+            Step::Add => {
+                // Others are pushed along.
+                let rest: Vec<Table> = (at..tables.len())
+                    .filter_map(|_| {
+                        let table = tables.get(at).cloned();
+                        tables.remove(at);
+                        table
+                    })
+                    .collect();
+                new.next().into_iter().chain(&rest).for_each(|entry| tables.push(entry.clone()));
+                at += 1;
+            }
         }
-        old = rest;
     }
-    new.iter().for_each(|entry| tables.push(table(entry)));
     if tables.is_empty() {
         document.remove(name);
     }
+}
+
+/// An entry as it is compared: key by key its text, and its numbers if it is one, or a list of some.
+struct Said(BTreeMap<String, (String, Option<Vec<f64>>)>);
+
+impl Said {
+    fn by(entry: &Table) -> Self {
+        let said = |item: &Item| (item.to_string(), numbers(item));
+        Self(entry.iter().map(|(key, item)| (key.to_owned(), said(item))).collect())
+    }
+
+    /// How unlike two entries are, 0 to 1: the mean over all keys of how far numbers are apart, x/(1 + x), and 1 for other
+    /// values.
+    fn difference(&self, other: &Self) -> f32 {
+        let apart = |key: &String, (text, numbers): &(String, Option<Vec<f64>>)| match other.0.get(key) {
+            Some((other, _)) if text == other => 0.0,
+            Some((_, others)) => match (numbers, others) {
+                (Some(a), Some(b)) if a.len() == b.len() => {
+                    let x = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>();
+                    // Other digits of the same number are another text.
+                    (x / (1.0 + x)).max(1e-6) as f32
+                }
+                _ => 1.0,
+            },
+            None => 1.0,
+        };
+        let own: f32 = self.0.iter().map(|(key, said)| apart(key, said)).sum();
+        let others = other.0.keys().filter(|key| !self.0.contains_key(*key)).count();
+        (own + others as f32) / (self.0.len() + others).max(1) as f32
+    }
+}
+
+/// The numbers of a value that is one, or a list of some.
+fn numbers(item: &Item) -> Option<Vec<f64>> {
+    let number = |value: &Value| value.as_float().or(value.as_integer().map(|n| n as f64));
+    match item.as_value()? {
+        Value::Array(list) => list.iter().map(number).collect(),
+        value => Some(vec![number(value)?]),
+    }
+}
+
+/// Changes what an entry says from `before` to `wanted`; what says the same stays as it is written.
+fn change(entry: &mut Table, before: &Table, wanted: &Table) {
+    entry.retain(|key, _| wanted.contains_key(key) || !before.contains_key(key));
+    let is_other = |key: &str, value: &Item| {
+        before.get(key).is_none_or(|before| before.to_string() != value.to_string())
+    };
+    let changed = wanted.iter().filter(|(key, value)| is_other(key, value));
+    changed.for_each(|(key, value)| put(entry, key, value));
 }
 
 /// Puts a value in the place of another one, whose comments stay.
@@ -218,6 +277,20 @@ mod tests {
         let text = edited(json!({ "vpl": [vpl(1.0), second, vpl(3.0), vpl(4.0)] }));
         assert!(text.starts_with(TEXT.split("[[proxy]]").next().unwrap()), "{text}");
         assert_eq!(edited(json!({ "vpl": [] })).matches("[[vpl]]").count(), 0);
+    }
+
+    /// The first one is moved, the second one taken away, another one put before the third: each keeps its own comment.
+    #[test]
+    fn comments_stay_with_their_vpls() {
+        let text = edited(json!({ "vpl": [vpl(1.25), vpl(3.0)] }));
+        let expected = TEXT.replace("[1, 0, 0] # here", "[1.25, 0.0, 0.0] # here");
+        let (head, rest) = expected.split_once("# Second.").unwrap();
+        assert_eq!(text, format!("{head}# Third.{}", rest.split_once("# Third.").unwrap().1));
+        let mut second = vpl(2.0);
+        second["weight"] = json!(3);
+        let text = edited(json!({ "vpl": [vpl(1.0), second, vpl(9.0), vpl(3.0)] }));
+        let (head, tail) = TEXT.split_once("# Third.").unwrap();
+        assert!(text.starts_with(head) && text.ends_with(&format!("# Third.{tail}")), "{text}");
     }
 
     /// What `place` has marked stays marked, moved or not: that it was edited is seen by the mark.
