@@ -152,7 +152,9 @@ impl Assignment {
         let begin = equals + 1;
         let value = text[begin..].trim();
         let table = |value: &str| toml::from_str::<toml::Table>(&format!("value = {value}"));
-        let parsed = table(value).or_else(|error| table(&with_zeros(value)).map_err(|_| error));
+        let written =
+            |value: &str| table(value).or_else(|error| table(&with_zeros(value)).map_err(|_| error));
+        let parsed = if is_word(value) { table(&format!("\"{value}\"")) } else { written(value) };
         let parsed = parsed.map_err(|error| {
             let indent = begin + (text[begin..].len() - text[begin..].trim_start().len());
             let within = error.span().map_or(0, |span| span.start.saturating_sub("value = ".len()));
@@ -170,6 +172,14 @@ impl Assignment {
         })?;
         Ok(Self { kind, name, path, value })
     }
+}
+
+/// Whether a value is a text without quotes: a name such as `static-vpl`, and no value of TOML. Shells eat quotes.
+fn is_word(value: &str) -> bool {
+    let is_name = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+    value.starts_with(char::is_alphabetic)
+        && value.chars().all(is_name)
+        && !["true", "false", "inf", "nan"].contains(&value)
 }
 
 /// Where a key makes no sense, why, and what would be right.
@@ -328,6 +338,20 @@ mod tests {
     }
 
     #[test]
+    fn words_need_no_quotes() {
+        for text in [
+            "streaming.method=static-vpl",
+            "streaming.method = static-vpl ",
+            "streaming.method=\"static-vpl\"",
+        ] {
+            let expected = Request::SetStreaming { values: values(json!({ "method": "static-vpl" })) };
+            assert_eq!(parsed(&[text]).unwrap(), [expected], "{text}");
+        }
+        let expected = Request::SetStreaming { values: values(json!({ "adaptive": true })) };
+        assert_eq!(parsed(&["streaming.adaptive=true"]).unwrap(), [expected]);
+    }
+
+    #[test]
     fn mistakes_are_told_with_their_place() {
         for (text, at, what) in [
             (
@@ -342,7 +366,7 @@ mod tests {
             ("light.my lamp.power_w=3", 7, "put names with blanks or dots in quotes"),
             ("light.\"lamp.power_w=3", 7, "a quote that does not end"),
             ("light.ä.power_w=[1,", 20, "array"),
-            ("material.red.name=white", 19, "'KEY=\"text\"'"),
+            ("material.red.name=white paint", 19, "'KEY=\"text\"'"),
             ("light.lamp.power_w=inf", 20, "no value that can be sent"),
             ("light.lamp.power_w=1\nx=2", 20, "no value that can be sent"),
             ("light.lamp.power_w=", 20, "write a TOML value"),

@@ -42,7 +42,7 @@ pub(crate) fn grouped(number: u64) -> String {
     out
 }
 
-/// `1234567.0` as `1.23 M`.
+/// `1234567.0` as `1.23 M`, to be followed by the unit: `0.50 ` has its space already.
 pub(crate) fn si(value: f64) -> String {
     let (factor, prefix) = match value.abs() {
         v if v >= 1e9 => (1e-9, " G"),
@@ -52,7 +52,7 @@ pub(crate) fn si(value: f64) -> String {
     };
     let scaled = value * factor;
     let decimals = if scaled.abs() >= 100.0 { 0 } else { 2 };
-    format!("{scaled:.decimals$}{prefix}").trim_end().to_owned()
+    format!("{scaled:.decimals$}{prefix}")
 }
 
 #[cfg(test)]
@@ -66,7 +66,7 @@ mod tests {
         assert_eq!(grouped(1_000), "1 000");
         assert_eq!(grouped(131_072), "131 072");
         assert_eq!(grouped(12_345_678), "12 345 678");
-        assert_eq!(si(0.5), "0.50");
+        assert_eq!(si(0.5), "0.50 ");
         assert_eq!(si(1_234_567.0), "1.23 M");
         assert_eq!(si(250_000.0), "250 k");
     }

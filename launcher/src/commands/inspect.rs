@@ -9,11 +9,12 @@ use crate::{
     signals::Listener,
 };
 use photonstream_protocol::{
-    ABI_MAJOR, ABI_MINOR, ChannelName, Liveness, Reading, Subscriber, VslFrame, monotonic_ns,
+    ABI_MAJOR, ABI_MINOR, ChannelName, ControlClient, Liveness, Reading, Reply, Request, Subscriber,
+    VslFrame, monotonic_ns,
 };
 use photonstream_renderer::telemetry::{ChangeTimes, LightAge};
 use photonstream_scene::Scene;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::{
     sync::atomic::Ordering,
     time::{Duration, Instant},
@@ -26,7 +27,8 @@ With --watch a report follows every second until Ctrl-C; with --json as well, ea
 
 JSON: { \"channel\", \"state\": live | paused | stalled | gone | retired, \"state_reason\", \"abi\", \"epoch\", \"frame\",
   \"config_generation\", \"notice\": what is wrong with the simulation, or null, \"frame_age_ms\", \"scene\", \"scene_hash\",
-  \"vsls\", \"objects\", \"lights\", \"threads\", \"converged\", \"simulation_time_s\", \"paths_total\", \"rays_total\",
+  \"method\", \"shining\": lights of a method of few lights that shine, and \"update_us\": what its last update took; all three
+  as the simulator answers, or null, \"vsls\", \"objects\", \"lights\", \"threads\", \"converged\", \"simulation_time_s\", \"paths_total\", \"rays_total\",
   \"deposits_total\", \"escaped\", \"rejected\", \"truncated\", \"absorbed_back\", \"paths_per_s\", \"rays_per_s\",
   \"deposits_per_s\", \"pool_paths\": slots of the pool in use, \"pool_capacity\": at most, \"pool_valid\",
   \"refined_paths\": samples beyond the pool, \"stale_share\": of the pool, in [0, 1], \"mean_age_s\" and \"greatest_age_s\": of
@@ -59,6 +61,8 @@ struct Report {
     frame_age_ms: f64,
     scene: String,
     scene_hash: String,
+    #[serde(flatten)]
+    method: Told,
     vsls: usize,
     objects: usize,
     lights: usize,
@@ -92,6 +96,33 @@ struct Report {
     total_flux_w: [f64; 3],
     decisions: Vec<Feature>,
 }
+
+/// What the simulator says of its method, if it answers.
+#[derive(Default, Serialize, Deserialize)]
+struct Told {
+    method: Option<String>,
+    shining: Option<usize>,
+    update_us: Option<f64>,
+}
+
+impl Told {
+    /// Asks a simulator that is there.
+    fn by(channel: &ChannelName, liveness: &Liveness) -> Self {
+        if !matches!(liveness, Liveness::Live | Liveness::Paused) {
+            return Self::default();
+        }
+        let state =
+            ControlClient::connect(channel).and_then(|mut client| client.request(&Request::Query, PATIENCE));
+        match state {
+            Ok(Reply::State { state }) => serde_json::from_value(state).unwrap_or_default(),
+            // The frame says all else.
+            _ => Self::default(),
+        }
+    }
+}
+
+/// So long a simulator may take to say what its method is.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Times from the arrival of the last change, in ms.
 #[derive(Serialize)]
@@ -138,7 +169,9 @@ pub(crate) fn run(args: &Args, global: &Global) -> Result<(), LauncherError> {
 fn report(args: &Args, subscriber: &Subscriber, changes: &ChangeTimes) -> Result<Report, LauncherError> {
     let frame = subscriber.frame().expect("invariant: present_frame waits for one");
     let scene = Scene::from_resolved(&frame.scene_text)?;
-    let (state, state_reason) = match subscriber.liveness() {
+    let liveness = subscriber.liveness();
+    let method = Told::by(&args.channel, &liveness);
+    let (state, state_reason) = match liveness {
         Liveness::Live => ("live", None),
         Liveness::Paused => ("paused", None),
         Liveness::Stalled { age } => ("stalled", Some(format!("no sign of life for {} ms", age.as_millis()))),
@@ -161,6 +194,7 @@ fn report(args: &Args, subscriber: &Subscriber, changes: &ChangeTimes) -> Result
         frame_age_ms: now_ns.saturating_sub(frame.publish_time_ns) as f64 * 1e-6,
         scene: scene.name.clone(),
         scene_hash: format!("{:016x}", frame.scene_hash),
+        method,
         vsls: frame.vsls.len(),
         objects: frame.objects.len(),
         lights: frame.lights.len(),
@@ -208,7 +242,6 @@ fn total_flux(frame: &VslFrame) -> [f64; 3] {
 
 fn text(r: &Report) -> String {
     let reason = r.state_reason.as_ref().map_or_else(String::new, |reason| format!(" ({reason})"));
-    let [red, green, blue] = r.total_flux_w;
     let mut out = format!(
         "channel {}: {}{reason}; {}, ABI {}, epoch {}, frame {}, config {}\n",
         r.channel,
@@ -228,6 +261,29 @@ fn text(r: &Report) -> String {
         r.objects,
         r.lights
     ));
+    if let Some(method) = &r.method.method {
+        out.push_str(&format!("method   {method}{}\n", update(&r.method)));
+    }
+    if r.method.update_us.is_none() {
+        out.push_str(&photons(r));
+    }
+    out.push_str(&change(r));
+    out.push_str(&format!("age      {:.1} ms since the last frame\n", r.frame_age_ms));
+    out.push_str("modelled:\n");
+    out.extend(r.decisions.iter().map(Feature::line));
+    out
+}
+
+/// What a method of few lights does.
+fn update(told: &Told) -> String {
+    let (Some(shining), Some(us)) = (told.shining, told.update_us) else { return String::new() };
+    format!(": {} lights shine, the last update took {us:.1} µs", grouped(shining as u64))
+}
+
+/// What photons have done, and how exact their light is.
+fn photons(r: &Report) -> String {
+    let [red, green, blue] = r.total_flux_w;
+    let mut out = String::new();
     out.push_str(&format!(
         "rates    {}paths/s, {}rays/s, {}deposits/s on {} threads\n",
         si(r.paths_per_s),
@@ -261,10 +317,6 @@ fn text(r: &Report) -> String {
         r.relative_error * 100.0,
         r.target_error.map_or_else(String::new, |target| format!(" (target {:.2} %)", target * 100.0)),
     ));
-    out.push_str(&change(r));
-    out.push_str(&format!("age      {:.1} ms since the last frame\n", r.frame_age_ms));
-    out.push_str("modelled:\n");
-    out.extend(r.decisions.iter().map(Feature::line));
     out
 }
 

@@ -15,15 +15,15 @@ use std::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 KEY is light.NAME.…, object.NAME.…, material.NAME.…, streaming.… or vpls.…, as in the config; NAME may contain / and be in quotes.
-VALUE is TOML. Several keys of one thing change together, in one frame. A config file is not written to.
+VALUE is TOML; a word needs no quotes. Several keys of one thing change together, in one frame. A config file is not written to.
 --wait waits without end where the light never converges (things that move): Ctrl-C.
 
 Examples:
   photonstream set --channel demo light.lamp.power_w=[80,60,40] object.ball.position_m=[0,1,0]
   photonstream set --channel demo light.lamp.enabled=false --wait
-  photonstream set --channel demo 'object.\"door leaf\".rotation_deg=[0,30,0]' 'streaming.sampling=\"fresh\"'
+  photonstream set --channel demo 'object.\"door leaf\".rotation_deg=[0,30,0]' streaming.sampling=fresh
   photonstream set --channel demo material.red.albedo=[.6,.1,.1] streaming.vsls=500
-  photonstream set --channel demo 'streaming.method=\"static-vpl\"' vpls.second_bounce_distance_m=2
+  photonstream set --channel demo streaming.method=static-vpl vpls.second_bounce_distance_m=2
   photonstream set --channel demo --pause
 
 JSON: { \"channel\", \"frame\": from which all is seen, \"requests\": [ { \"type\", \"name\", \"values\", \"frame\" } ],

@@ -132,6 +132,7 @@ fn json_reports_have_their_documented_keys() {
         &inspect,
         &keys(
             "channel state state_reason abi epoch frame config_generation notice frame_age_ms scene scene_hash vsls \
+             method shining update_us \
              objects lights threads converged simulation_time_s paths_total rays_total deposits_total escaped rejected \
              truncated absorbed_back paths_per_s rays_per_s deposits_per_s pool_paths pool_capacity pool_valid \
              refined_paths stale_share mean_age_s greatest_age_s relative_error target_error retraced_paths rays_saved \
@@ -139,6 +140,10 @@ fn json_reports_have_their_documented_keys() {
              total_flux_w decisions",
         ),
     );
+    assert_eq!(inspect["method"], "photon-streaming");
+    ground.json(&["set", "streaming.method=instant-radiosity", "--channel", "r", "--json"]);
+    let text = ground.run(&["inspect", "--channel", "r"]).stdout;
+    assert!(text.contains("method   instant-radiosity: ") && !text.contains("paths/s"), "{text}");
     simulation.signal(rustix::process::Signal::TERM);
     let summary = serde_json::from_str::<serde_json::Value>(&simulation.wait().stdout).unwrap();
     assert_eq!(summary["ending"], "stopped");
