@@ -272,6 +272,34 @@ fn phantoms_go_on_in_frames_of_their_own() {
     service.end();
 }
 
+/// In fixed steps a phantom follows in each of them, also while the animation holds still: the torch goes 1 m in five steps of
+/// 10 ms and stays there; in a time constant of 200 ms each step goes 1 - exp(-0.05) of the way that is left. Tolerance: a
+/// thousandth of the way for roundings of 60 steps and of the instants.
+#[test]
+fn phantoms_follow_in_fixed_steps_while_the_animation_holds() {
+    let moving = "fixed_step_ms = 10\n[vpls]\nsmoothing_s = 0.2\n\
+         [[animation]]\nlight = \"torch\"\nproperty = \"position_m\"\ntimes_s = [0, 0.05, 30]\n\
+         values = [[0, 1, 0], [1, 1, 0], [1, 1, 0]]";
+    let first = Simulation::new(Arc::new(room(&format!("method = \"phantom-vpl\"\n{moving}"))));
+    let service = start("few-steps", &first, 1, None);
+    let mut subscriber = service.attach();
+    let mut seen = Vec::new();
+    let see = |frame: &VslFrame| seen.push((frame.statistics.simulation_time_s, frame.vsls[0].position[0]));
+    frame_where(&mut subscriber, 1, see, |frame| frame.statistics.simulation_time_s > 0.6);
+    let mut along = vec![0.0f64];
+    for step in 1..=100 {
+        let (target, last) = ((f64::from(step) / 5.0).min(1.0), along[along.len() - 1]);
+        along.push(last + (target - last) * (1.0 - (-0.05f64).exp()));
+    }
+    let held = seen.iter().filter(|(time_s, _)| *time_s > 0.06).count();
+    assert!(held > 5, "{seen:?}");
+    for (time_s, x) in &seen {
+        let expected = along[(time_s * 100.0).round() as usize];
+        assert!((f64::from(*x) - expected).abs() < 1e-3, "{time_s} s: {x}, expected {expected}");
+    }
+    service.end();
+}
+
 /// Renderers that shadow by distance maps have them of few lights, too.
 #[test]
 fn few_lights_have_distance_maps() {
