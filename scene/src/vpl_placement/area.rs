@@ -30,8 +30,11 @@ pub(super) struct Share {
 const POINTS_EACH: usize = 128;
 const POINTS: std::ops::RangeInclusive<usize> = 1 << 14..=1 << 17;
 
-/// How far from a light surface may lie that it stands for, in multiples of the spacing.
-const REACH: f32 = 2.0;
+/// Points for each of so many lights that the limit would leave them fewer.
+const POINTS_AT_LEAST: usize = 16;
+
+/// How far from a light surface may lie that it stands for, in multiples of the reach.
+const BEYOND: f32 = 2.0;
 
 /// How much finer the first grid is in which a reflection is looked for.
 const FINER: f32 = 6.0;
@@ -39,19 +42,22 @@ const FINER: f32 = 6.0;
 /// Surfaces of other material are shared out as if so much farther away, squared: to a light of their own where there is one.
 const UNLIKE: f32 = 4.0;
 
-/// The area in m² that each light stands for: of all reflecting sides, what is near a reflection and open towards it goes
-/// to the nearest light within 45°, moving objects to lights of their own. Points are spread evenly over the surface.
+/// The area in m² that each light stands for: of all reflecting sides, what has a reflection within `reach_m` and open towards
+/// it goes to the nearest light within 45°, moving objects to lights of their own. Points are spread evenly over the surface.
 pub(super) fn areas(
     scene: &Scene,
     kinds: &Kinds,
-    (reflections, spacing_m): (&[Reflection], f32),
+    (reflections, reach_m): (&[Reflection], f32),
     shares: &[Share],
     sequence: Sequence,
 ) -> Vec<f32> {
     let surface = Surface::of(scene);
     let count = (POINTS_EACH * shares.len()).clamp(*POINTS.start(), *POINTS.end());
-    // Most points have a reflection close by; the others look as far as the spacing.
-    let grids = [spacing_m / FINER, spacing_m].map(|edge_m| {
+    let count = count.max(POINTS_AT_LEAST * shares.len());
+    let mut lights = Grid::new(BEYOND * reach_m);
+    (0u32..).zip(shares).for_each(|(number, share)| lights.insert(share.position, number));
+    // Most points have a reflection close by; the others look as far as the reach.
+    let grids = [reach_m / FINER, reach_m].map(|edge_m| {
         let mut grid = Grid::new(edge_m);
         (0u32..).zip(reflections).for_each(|(number, at)| grid.insert(at.position, number));
         grid
@@ -67,9 +73,9 @@ pub(super) fn areas(
         let point = surface.point(scene, kinds, index, count, sequence.sample(index as u64))?;
         let (_, nearest) = grids.iter().find_map(|grid| nearest_in(grid, &point))?;
         let to = nearest - point.position;
-        let is_reached = to.length_squared() < spacing_m * spacing_m
+        let is_reached = to.length_squared() < reach_m * reach_m
             && !scene.bvh.occluded(&Ray { origin: point.position, direction: to, t_max: 1.0 });
-        is_reached.then(|| owner_of(&point, shares, REACH * spacing_m)).flatten()
+        is_reached.then(|| owner_of(&point, shares, &lights, BEYOND * reach_m)).flatten()
     };
     let owners: Vec<Option<usize>> = (0..count).into_par_iter().map(owner).collect();
     let mut points = vec![0u32; shares.len()];
@@ -78,17 +84,18 @@ pub(super) fn areas(
     points.into_iter().map(|points| (f64::from(points) * area_of_point) as f32).collect()
 }
 
-/// The light that stands for a place.
-fn owner_of(point: &Place, shares: &[Share], reach_m: f32) -> Option<usize> {
+/// The light that stands for a place, of those within `within_m`, the edge of the grid of their numbers.
+fn owner_of(point: &Place, shares: &[Share], lights: &Grid, within_m: f32) -> Option<usize> {
     let distance_sq = |share: &Share| {
         let own = share.kind.is_none_or(|kind| kind.moving == point.kind.moving);
         let distance_sq = share.position.distance_squared(point.position);
-        let fits = own && share.normal.dot(point.normal) >= COS_TOGETHER && distance_sq < reach_m * reach_m;
+        let fits = own && share.normal.dot(point.normal) >= COS_TOGETHER && distance_sq < within_m * within_m;
         let is_alike = share.kind.is_none_or(|kind| kind.is_alike(&point.kind));
         fits.then_some(if is_alike { distance_sq } else { UNLIKE * distance_sq })
     };
-    let distances = shares.iter().enumerate().filter_map(|(i, share)| Some((i, distance_sq(share)?)));
-    distances.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    let near = lights.near(point.position).map(|number| number as usize);
+    let distances = near.filter_map(|i| Some((i, distance_sq(&shares[i])?)));
+    distances.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
 }
 
 /// A place on a reflecting side.

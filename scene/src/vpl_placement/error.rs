@@ -1,7 +1,7 @@
 //! Says why no virtual point lights were placed.
 
 /// Why placement of virtual point lights failed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VplPlacementError {
     /// A setting is outside its domain.
     #[error("{name}: found {found}, expected {expected}")]
@@ -21,5 +21,16 @@ pub enum VplPlacementError {
     NothingFound {
         /// How many were traced.
         paths: u32,
+    },
+    /// No surface lies nearest to any of what was found.
+    #[error(
+        "none of {clusters} places found, {spacing_m} m apart, has surface around it that no other stands for; trace more paths \
+         with --population, or give a wider --spacing-m"
+    )]
+    NoSurface {
+        /// How many places there were.
+        clusters: u32,
+        /// Their distance, m.
+        spacing_m: f32,
     },
 }

@@ -72,16 +72,22 @@ pub struct VplPlacement {
     pub taken: u32,
     /// Clusters left out because all surface around them is nearer to others.
     pub without_surface: u32,
+    /// Whether the spacing is what the reflections bear, and more of them would give more VPLs, up to the limit of number.
+    pub wants_population: bool,
 }
 
 /// Steps of the spacing that is looked for: each is 2^⅛ finer, from the radius of the scene down to a 1024th of it.
 const SPACINGS: i32 = 80;
 
+/// Reflections of a cluster in the mean, at the finest spacing that they bear: the circle of a cluster holds no reflection
+/// once in some thousand, where they lie as dense as in the mean.
+const BORNE_BY: usize = 8;
+
 /// Places VPLs: explores free space, traces diffuse paths from there and from the lights, puts together what lies near and
 /// looks the same way, and keeps the most populous. Equal for any number of threads.
 ///
 /// # Errors
-/// If a setting is outside its domain, or nothing that reflects is found.
+/// If a setting is outside its domain, nothing that reflects is found, or no VPL has surface around it.
 pub fn place_vpls(
     scene: &Scene,
     settings: &VplPlacementSettings,
@@ -99,9 +105,11 @@ pub fn place_vpls(
     if reflections.is_empty() {
         return Err(VplPlacementError::NothingFound { paths: settings.population });
     }
+    let borne = (reflections.len() / BORNE_BY).max(1);
+    let most = settings.most as usize;
     let (spacing_m, (found, of)) = match settings.spacing_m {
         Some(spacing) => (spacing as f32, clusters(&reflections, spacing as f32)),
-        None => fitting(&reflections, scene.bounds.radius, settings.most),
+        None => fitting(&reflections, scene.bounds.radius, most.min(borne)),
     };
     let lies_free = |cluster: &Cluster| {
         let here = (cluster.position(), cluster.normal());
@@ -110,7 +118,7 @@ pub fn place_vpls(
     let mut kept: Vec<u32> = (0..found.len() as u32).filter(|&i| lies_free(&found[i as usize])).collect();
     let free = kept.len();
     kept.sort_by_key(|&i| std::cmp::Reverse(found[i as usize].population));
-    kept.truncate(settings.most as usize);
+    kept.truncate(most);
     let bases = bases(&reflections, &found, &of);
     let mut vpls: Vec<PlacedVpl> =
         kept.iter().map(|&i| placed(scene, &found[i as usize], &bases[i as usize])).collect();
@@ -125,10 +133,18 @@ pub fn place_vpls(
         let others = others.map(|site| Share { position: site.position, normal: site.normal, kind: None });
         let shares: Vec<Share> = own.chain(others).collect();
         let sequence = Sequence::new(settings.seed, first + streams);
-        let areas = area::areas(scene, &kinds, (&reflections, spacing_m), &shares, sequence);
+        // Where clusters are of few reflections, these leave gaps wider than the spacing.
+        let reach_m = match found.len() > borne {
+            true => spacing_m.max(fitting(&reflections, scene.bounds.radius, borne).0),
+            false => spacing_m,
+        };
+        let areas = area::areas(scene, &kinds, (&reflections, reach_m), &shares, sequence);
         vpls.iter_mut().zip(areas).for_each(|(vpl, area)| vpl.area_m2 = Some(area));
         // It would never shine.
         vpls.retain(|vpl| vpl.area_m2 != Some(0.0));
+        if vpls.is_empty() && !kept.is_empty() {
+            return Err(VplPlacementError::NoSurface { clusters: kept.len() as u32, spacing_m });
+        }
     }
     let bias = settings.normal_bias_m as f32;
     vpls.iter_mut().for_each(|vpl| vpl.position -= vpl.normal * bias);
@@ -139,6 +155,7 @@ pub fn place_vpls(
         left_out: (free - kept.len()) as u32,
         taken: (found.len() - free) as u32,
         without_surface: (kept.len() - vpls.len()) as u32,
+        wants_population: settings.spacing_m.is_none() && borne < most,
         vpls,
     })
 }
@@ -158,14 +175,14 @@ fn origins(scene: &Scene, settings: &VplPlacementSettings) -> Vec<Vec3> {
 }
 
 /// The finest spacing that needs no more than `most` clusters.
-fn fitting(reflections: &[Reflection], radius_m: f32, most: u32) -> (f32, (Vec<Cluster>, Vec<u32>)) {
+fn fitting(reflections: &[Reflection], radius_m: f32, most: usize) -> (f32, (Vec<Cluster>, Vec<u32>)) {
     let spacing = |step: i32| radius_m * (-0.125 * step as f32).exp2();
     let (mut fits, mut best) = (0, clusters(reflections, spacing(0)));
     let mut too_fine = SPACINGS + 1;
     while too_fine - fits > 1 {
         let middle = (fits + too_fine) / 2;
         let found = clusters(reflections, spacing(middle));
-        if found.0.len() <= most as usize {
+        if found.0.len() <= most {
             (fits, best) = (middle, found);
         } else {
             too_fine = middle;

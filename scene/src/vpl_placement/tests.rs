@@ -182,6 +182,84 @@ fn areas_sum_up_to_the_surface() {
     assert!(place(&of_text(ROOM), &automatic).vpls.iter().all(|vpl| vpl.area_m2.is_none()));
 }
 
+/// However dense VPLs are wanted, they stand for the whole surface: without a spacing they are no denser than the
+/// reflections bear, with one their gaps are bridged. Besides the 1 % above, what lies in corners has fewer reflections than
+/// the mean, and with 6144 of them on 24 m² is up to three spacings away: 2 %.
+#[test]
+fn dense_vpls_have_all_the_surface() {
+    let scene = of_text(ROOM);
+    let sum = |found: &VplPlacement| found.vpls.iter().map(|vpl| vpl.area_m2.unwrap()).sum::<f32>();
+    for (most, spacing_m) in [(600, None), (65_536, None), (65_536, Some(0.05)), (65_536, Some(1e-6))] {
+        let found = place(&scene, &VplPlacementSettings { most, spacing_m, ..settings() });
+        let area = sum(&found);
+        assert!((area - 24.0).abs() < 0.48, "{most} {spacing_m:?}: {area}, {}", found.vpls.len());
+        assert_eq!(found.wants_population, most == 65_536 && spacing_m.is_none());
+        if spacing_m.is_none() {
+            assert!(found.vpls.len() <= 6144 / 8 && found.without_surface == 0);
+        }
+    }
+    // Every place that was found stands for its part: 16 points each leave one in some hundred without.
+    let settings = VplPlacementSettings { most: 65_536, spacing_m: Some(1e-6), ..settings() };
+    let all = place(&scene, &settings);
+    assert!(
+        all.vpls.len() + all.without_surface as usize == 6144 && all.vpls.len() > 5500,
+        "{}",
+        all.vpls.len()
+    );
+}
+
+/// A wall with a gap, behind which nothing is seen from the eye but what lies straight through it: paths come round the corner
+/// because they go on from where they were reflected. They would not if each started again from its origin, as in the authors'
+/// script, nor with one reflection.
+#[test]
+fn paths_go_on_from_what_they_meet() {
+    let text = "
+[camera]
+position_m = [-1.5, 0, -0.5]
+target_m = [0, 0, -0.5]
+vertical_fov_deg = 60
+[material.white]
+albedo = 0.5
+[object.room]
+material = \"white\"
+sides = \"back\"
+box = { size_m = [4, 2, 2] }
+[object.wall]
+material = \"white\"
+sides = \"both\"
+quad = { corner_m = [0, -1, -1], edge_u_m = [0, 0, 1.5], edge_v_m = [0, 2, 0] }
+[light.lamp]
+power_w = 1
+point = { position_m = [-1.5, 0, -0.5] }
+";
+    let scene = of_text(text);
+    // Through the gap, from z = 0.5 on, the eye sees what lies beyond z = 0.5 + 2/3 x.
+    let behind = |depth: u32| {
+        let settings =
+            VplPlacementSettings { explore: 0, depth, weights: PlacedWeights::Automatic, ..settings() };
+        let vpls = place(&scene, &settings).vpls.into_iter();
+        let positions = vpls.map(|vpl| vpl.position.as_dvec3() + scene.origin_m);
+        positions.filter(|p| p.x > 0.1 && p.z < 0.4).count()
+    };
+    assert_eq!(behind(1), 0);
+    // 4 m² of floor, wall and ceiling of 20 m² or so, at most 200 VPLs.
+    assert!(behind(2) > 10 && behind(3) > 10, "{} {}", behind(2), behind(3));
+}
+
+/// One reflection bears no spacing of a micrometre: no point of the surface is so near to it.
+#[test]
+fn vpls_without_surface_are_an_error() {
+    let settings = VplPlacementSettings {
+        population: 1,
+        depth: 1,
+        spacing_m: Some(1e-6),
+        ..VplPlacementSettings::default()
+    };
+    let error = place_vpls(&of_text(ROOM), &settings, &[]).unwrap_err();
+    assert_eq!(error, VplPlacementError::NoSurface { clusters: 1, spacing_m: 1e-6 });
+    assert!(error.to_string().contains("more paths with --population"));
+}
+
 #[test]
 fn vpls_lie_on_curved_surfaces() {
     let ball = ROOM.replace("box = { size_m = [2, 2, 2] }", "sphere = { radius_m = 1, segments = 64 }");
