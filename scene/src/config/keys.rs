@@ -163,7 +163,11 @@ fn every_key() -> SceneConfig {
             second_bounce_albedo: Some(1.0),
             second_bounce_distance_m: Some(1.0),
             photons: Some(1),
-            placed: Some(PlacedConfig { sites: vec!["a".into()] }),
+            placed: Some(PlacedConfig {
+                from: Some("a".into()),
+                given: vec!["a".into()],
+                sites: vec!["a".into()],
+            }),
         }),
         vpl: vec![VplConfig {
             position_m: v,

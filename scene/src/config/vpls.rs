@@ -40,6 +40,11 @@ pub struct VplsConfig {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlacedConfig {
+    /// Hash and name of the file that this one was made from.
+    pub from: Option<String>,
+    /// Hashes of the entries that were made by hand there.
+    #[serde(default)]
+    pub given: Vec<String>,
     /// Hash, position and normal of each.
     #[serde(default)]
     pub sites: Vec<String>,

@@ -15,7 +15,7 @@ mod tests;
 mod trace;
 
 pub use error::VplPlacementError;
-pub use file::{VplFile, VplFileCounts};
+pub use file::{VplFile, VplFileCounts, VplMergeError};
 pub use settings::{PlacedWeights, VplPlacementSettings};
 
 use crate::scene::{ObjectId, Scene};

@@ -85,7 +85,7 @@ pub(super) struct Entry<'a> {
     pub(super) weight: Option<f64>,
     /// The object that takes it along.
     pub(super) object: Option<&'a str>,
-    /// What it lies on, for people.
+    /// What it lies on, for people, as a line of TOML.
     pub(super) comment: String,
 }
 
@@ -106,7 +106,7 @@ impl Entry<'_> {
         }
         let hash = hash(&table);
         table.insert(HASH, value(hash));
-        table.decor_mut().set_prefix(format!("\n# {}\n", self.comment));
+        table.decor_mut().set_prefix(format!("\n{}\n", self.comment));
         table
     }
 }

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// A closed room, with comments, hand-made VPLs and odd spacing, which all have to stay.
-const FILE: &str = "\
+pub(super) const FILE: &str = "\
 # A room.
 [object.room]   # closed
 material = \"white\"
@@ -36,7 +36,7 @@ point = { position_m = [0, 0.5, 0] }
 # The end.
 ";
 
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     let start = FILE.find("[[vpl]]").unwrap();
     let end = FILE.find("[streaming]").unwrap();
     let text = FILE[..start].to_owned() + &FILE[end..];
@@ -44,23 +44,23 @@ fn scene() -> Scene {
     config.build_with(&AssetRoots::default()).unwrap()
 }
 
-fn parse(text: &str) -> VplFile {
+pub(super) fn parse(text: &str) -> VplFile {
     VplFile::parse(text, Path::new("room.toml")).unwrap()
 }
 
 /// A run of `place`: the file again, and what was placed.
-fn run(text: &str, settings: &VplPlacementSettings) -> (String, Vec<PlacedVpl>) {
+pub(super) fn run(text: &str, settings: &VplPlacementSettings) -> (String, Vec<PlacedVpl>) {
     let (scene, file) = (scene(), parse(text));
     let placement = place_vpls(&scene, settings, &file.taken(&scene)).unwrap();
     (file.with(&scene, &placement, 1.0), placement.vpls)
 }
 
-fn settings() -> VplPlacementSettings {
+pub(super) fn settings() -> VplPlacementSettings {
     VplPlacementSettings { population: 1024, spacing_m: Some(0.6), ..VplPlacementSettings::default() }
 }
 
 /// The text of the entry that holds `needle`, with its comment.
-fn entry_with(text: &str, needle: &str) -> String {
+pub(super) fn entry_with(text: &str, needle: &str) -> String {
     let at = text.find(needle).unwrap();
     let start = text[..at].rfind("\n# ").unwrap();
     let end = text[at..].find("\n\n").map_or(text.len(), |end| at + end + 1);
@@ -132,7 +132,7 @@ fn deleted_entries_stay_deleted() {
     let other = VplPlacementSettings { seed: 9, spacing_m: Some(0.5), ..settings() };
     let (third, placed) = run(&again, &other);
     assert_eq!(parse(&third).counts.deleted, 1);
-    let (site, _) = &parse(&third).former[0];
+    let site = parse(&third).former[0].site;
     let at = (site.position - scene().origin_m).as_vec3();
     let normal = site.normal.as_vec3();
     assert!(placed.iter().all(|vpl| vpl.position.distance(at) >= 0.5 || vpl.normal.dot(normal) < 0.7));
@@ -140,6 +140,136 @@ fn deleted_entries_stay_deleted() {
     let line = again.lines().find(|line| line.contains(&format!("\"{hash} "))).unwrap();
     let (restored, _) = run(&again.replace(&format!("{line}\n"), ""), &settings());
     assert_eq!(restored, text);
+}
+
+/// An edited copy stays, and does not take away what it was copied from.
+#[test]
+fn copies_leave_their_original() {
+    let (text, vpls) = run(FILE, &settings());
+    let entry = entry_with(&text, "placed = ");
+    let line = entry.lines().find(|line| line.starts_with("position_m")).unwrap();
+    // Outside the room, where nothing is placed.
+    let copy = entry.replace(line, "position_m = [0, 5, 0]");
+    let (again, after) = run(&format!("{text}{copy}"), &settings());
+    assert!(again.contains(&entry) && again.contains("position_m = [0, 5, 0]"));
+    assert_eq!(after, vpls);
+    let counts = parse(&again).counts;
+    assert_eq!((counts.by_hand, counts.edited, counts.deleted), (1, 1, 0));
+    assert_eq!(run(&again, &settings()).0, again);
+}
+
+/// Comments stay wherever they are: below the last entry, at and in the list of what was placed, and at placed entries, which
+/// then stay as they are.
+#[test]
+fn comments_stay() {
+    let (text, vpls) = run(FILE, &settings());
+    let deleted = entry_with(&text, "placed = ");
+    let (without, _) = run(&text.replace(&deleted, ""), &settings());
+    let (entries, list) = without.split_at(without.find("\n# What `photonstream place`").unwrap());
+    let mut sites: Vec<String> = list.lines().map(|line| line.to_owned() + "\n").collect();
+    let first = sites.iter().position(|line| line.starts_with("    \"")).unwrap();
+    sites[first] = sites[first].replace('\n', " # of no use\n");
+    sites[first + 1] = format!("    # the second\n{}", sites[first + 1]);
+    let end = sites.iter().position(|line| line == "]\n").unwrap();
+    sites[end] = "    # the last\n] # all\n".into();
+    let list = sites
+        .concat()
+        .replace("[vpls.placed]", "[vpls.placed] # machine")
+        .replace("sites =", "# which\nsites =");
+    let edited = format!("{entries}\n# below all\n\n# still below\n{list}");
+    let (again, after) = run(&edited, &settings());
+    assert_eq!(after.len(), vpls.len() - 1);
+    assert_eq!(again, edited);
+    // What its line no longer has stays in the list.
+    let other = VplPlacementSettings { spacing_m: Some(0.4), ..settings() };
+    let (other, _) = run(&edited, &other);
+    for comment in [
+        "# of no use",
+        "# the second",
+        "# the last",
+        "] # all",
+        "# machine",
+        "# which",
+        "# below all\n\n# still below\n",
+    ] {
+        assert_eq!(other.matches(comment).count(), 1, "{comment}");
+    }
+    assert!(parse(&other).counts.deleted == 1);
+
+    // Comments at an entry.
+    let line = deleted.lines().find(|line| line.starts_with("normal")).unwrap();
+    let at = |comment: &str| match comment {
+        "above" => deleted.replacen("\n# ", "\n# Mine.\n# ", 1),
+        "instead" => format!("\n# Mine.\n{}", &deleted[deleted.find("[[vpl]]").unwrap()..]),
+        "header" => deleted.replace("[[vpl]]", "[[vpl]] # Mine."),
+        "key" => deleted.replace(line, &format!("# Mine.\n{line}")),
+        "value" => deleted.replace(line, &format!("{line} # Mine.")),
+        _ => deleted.replace(line, &line.replace(']', "# Mine.\n]")),
+    };
+    for place in ["above", "instead", "header", "key", "value", "array"] {
+        let commented = text.replace(&deleted, &at(place));
+        let (again, after) = run(&commented, &settings());
+        assert!(again.contains(&at(place)), "{place}\n{again}");
+        assert_eq!((after.len(), parse(&again).counts.edited), (vpls.len() - 1, 1), "{place}");
+    }
+    // Only without its own comment it is still as it was written.
+    let bare = text.replace(&deleted, &format!("\n{}", &deleted[deleted.find("[[vpl]]").unwrap()..]));
+    assert_eq!(run(&bare, &settings()).0, text);
+}
+
+/// Tables that are written inline get headers; comments beside them go beside those, others above.
+#[test]
+fn comments_at_inline_tables_stay() {
+    let inline = "\
+# The lights.
+vpl = [
+    # One.
+    { position_m = [0, -1, 0], normal = [0, 1, 0], albedo = 0.3 }, # low
+    # Two.
+    { position_m = [0, 1, 0], normal = [0, -1, 0], albedo = 0.3 } # high
+] # mine
+# How.
+vpls = { softening_m2 = 0.01 } # soft
+";
+    let expected = "
+# The lights.
+# One.
+[[vpl]] # low
+position_m = [0, -1, 0]
+normal = [0, 1, 0]
+albedo = 0.3
+
+# Two.
+[[vpl]] # high
+# mine
+position_m = [0, 1, 0]
+normal = [0, -1, 0]
+albedo = 0.3
+
+# How.
+[vpls] # soft
+softening_m2 = 0.01
+";
+    let start = FILE.find("[[vpl]]").unwrap();
+    let rest = FILE[..start].to_owned() + &FILE[FILE.find("[streaming]").unwrap()..];
+    let (text, _) = run(&format!("{inline}{rest}"), &settings());
+    assert!(text.contains(expected), "{text}");
+    assert_eq!(run(&text, &settings()).0, text);
+    let (text, _) = run(
+        &format!("vpl = [{{ position_m = [0, -1, 0], normal = [0, 1, 0], albedo = 0.3 }}] # mine\n{rest}"),
+        &settings(),
+    );
+    assert!(text.starts_with("[[vpl]] # mine\n"), "{text}");
+    let (text, _) = run(&format!("vpl = [] # mine\n{rest}"), &settings());
+    assert!(text.contains("# mine\n"), "{text}");
+}
+
+#[test]
+fn line_ends_stay() {
+    let (text, _) = run(FILE, &settings());
+    let (crlf, _) = run(&FILE.replace('\n', "\r\n"), &settings());
+    assert_eq!(crlf, text.replace('\n', "\r\n"));
+    assert_eq!(run(&crlf, &settings()).0, crlf);
 }
 
 /// The hash is that of values: order, spaces and the way numbers are written do not matter, other keys do.
