@@ -35,10 +35,10 @@ impl Source {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum VplMergeError {
     /// The file that is there was not made from this one, and says other things.
-    #[error("is another scene's")]
+    #[error("it was not made from that file, and says other things apart from VPLs")]
     OtherScene,
     /// Apart from VPLs, people changed both since one was made from the other.
-    #[error("was changed apart from its VPLs, as that one was since")]
+    #[error("apart from VPLs, both were changed since one was made from the other")]
     BothChanged,
 }
 
