@@ -28,7 +28,8 @@ With --watch a report follows every second until Ctrl-C; with --json as well, ea
 JSON: { \"channel\", \"state\": live | paused | stalled | gone | retired, \"state_reason\", \"abi\", \"epoch\", \"frame\",
   \"config_generation\", \"notice\": what is wrong with the simulation, or null, \"frame_age_ms\", \"scene\", \"scene_hash\",
   \"method\", \"shining\": lights of a method of few lights that shine, and \"update_us\": what its last update took; all three
-  as the simulator answers, or null, \"vsls\", \"objects\", \"lights\", \"threads\", \"converged\", \"simulation_time_s\", \"paths_total\", \"rays_total\",
+  as the simulator answers, or null, \"vsls\", \"objects\", \"lights\", \"threads\", \"converged\", \"simulation_time_s\",
+  \"paths_total\", \"rays_total\",
   \"deposits_total\", \"escaped\", \"rejected\", \"truncated\", \"absorbed_back\", \"paths_per_s\", \"rays_per_s\",
   \"deposits_per_s\", \"pool_paths\": slots of the pool in use, \"pool_capacity\": at most, \"pool_valid\",
   \"refined_paths\": samples beyond the pool, \"stale_share\": of the pool, in [0, 1], \"mean_age_s\" and \"greatest_age_s\": of

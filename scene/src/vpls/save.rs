@@ -106,34 +106,20 @@ fn write_list<T: Serialize + PartialEq>(document: &mut DocumentMut, name: &str, 
     };
     let written: [Vec<Table>; 2] = [before, now].map(|list| list.iter().map(table).collect());
     let [before, now] = &written;
-    let (mut at, mut old, mut new) = (0, before.iter(), now.iter());
     let said = [before, now].map(|list| list.iter().map(Said::by).collect::<Vec<_>>());
-    for step in steps(before.len(), now.len(), |i, j| said[0][i].difference(&said[1][j])) {
+    let steps = steps(before.len(), now.len(), |i, j| said[0][i].difference(&said[1][j]));
+    let (mut there, mut old, mut new) = (std::mem::take(tables).into_iter(), before.iter(), now.iter());
+    for step in steps {
         match step {
             Step::Keep => {
-                if let (Some(entry), Some(before), Some(wanted)) =
-                    (tables.get_mut(at), old.next(), new.next())
+                if let (Some(mut entry), Some(before), Some(wanted)) = (there.next(), old.next(), new.next())
                 {
-                    change(entry, before, wanted);
+                    change(&mut entry, before, wanted);
+                    tables.push(entry);
                 }
-                at += 1;
             }
-            Step::Remove => {
-                tables.remove(at);
-                old.next();
-            }
-            Step::Add => {
-                // Others are pushed along.
-                let rest: Vec<Table> = (at..tables.len())
-                    .filter_map(|_| {
-                        let table = tables.get(at).cloned();
-                        tables.remove(at);
-                        table
-                    })
-                    .collect();
-                new.next().into_iter().chain(&rest).for_each(|entry| tables.push(entry.clone()));
-                at += 1;
-            }
+            Step::Remove => drop((there.next(), old.next())),
+            Step::Add => tables.extend(new.next().cloned()),
         }
     }
     if tables.is_empty() {
